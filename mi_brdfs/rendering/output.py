@@ -22,8 +22,8 @@ IMAGES = {
 
 
 def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
-    """Return linear RGB, shape (height, width, 3), denoised by Intel's Open Image Denoise. Films with a box filter give
-    the best result, as pixels then share no samples.
+    """Return linear RGB, shape (height, width, 3), or luminance, shape (height, width, 1), denoised by Intel's Open Image
+    Denoise. Films with a box filter give the best result, as pixels then share no samples.
 
     Raises:
         ImportError: without the extra that brings it.
@@ -34,8 +34,8 @@ def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
     pixels = np.array(colours, np.float32)
-    if pixels.ndim != 3 or pixels.shape[2] != 3:
-        raise ValueError(f"denoise takes colours of the shape (height, width, 3), not {pixels.shape}")
+    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3):
+        raise ValueError(f"denoise takes colours of the shape (height, width, 3 or 1), not {pixels.shape}")
     height, width, _ = pixels.shape
     # It leaves lines along the edges where sides are no multiples of 16.
     padded = np.pad(pixels, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
