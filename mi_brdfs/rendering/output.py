@@ -22,8 +22,8 @@ IMAGES = {
 
 
 def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
-    """Return linear RGB, shape (height, width, 3), or luminance, shape (height, width, 1), denoised by Intel's Open Image
-    Denoise. Films with a box filter give the best result, as pixels then share no samples.
+    """Return linear RGB, shape (height, width, 3), or luminance, shape (height, width, 1), denoised by Intel's Open
+    Image Denoise. Films with a box filter give the best result, as pixels then share no samples.
 
     Raises:
         ImportError: without the extra that brings it.
