@@ -171,6 +171,7 @@ REFUSED = [
     ("upload?name=x", {"json": {}}, 422, "An upload is the bytes of a file"),
     ("upload?name=x", {"data": b"x", "headers": {"Content-Type": "multipart/form-data"}}, 422, "An upload is"),
     ("upload?name=x", {"data": b"x", "headers": {"Content-Encoding": "gzip"}}, 422, "x is of no known format"),
+    ("upload?name=my%20mesh.ply", {"data": b"ply\nno mesh"}, 422, "my mesh.ply"),
     ("upload?name=x.binary", {"data": bytes((64 << 20) + (1 << 18))}, 413, "A file may have 64 MiB at most."),
     *((f"upload?name=x.{kind}", {"data": data}, 422, '{"error": ') for kind, data in (
         ("binary", b"no MERL file"), ("bsdf", b"\0" * 1000), ("exr", os.urandom(5000)), ("obj", b"v 0 0 nought"),

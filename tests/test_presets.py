@@ -193,7 +193,7 @@ def test_names():
     [
         ("ngan/ward/blu-acrylic", "There is no preset 'ngan/ward/blu-acrylic'; did you mean 'ngan/ward/blue-acrylic'?"),
         ("ngan/wardd/chrome", "did you mean 'ngan/ward/chrome'?"),
-        ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi_brdfs.presets() lists them."),
+        ("ngan/ward/qqq", "There is no preset 'ngan/ward/qqq'; mi-brdfs presets and mi_brdfs.presets() list them."),
         ("ngan/lafortune/chrome", "rounding moves and scales the lobes"),
         ("low/ashikhmin-shirley-e1/white-paint", "the scale of its specular lobe is 1.29, above 1."),
         (("ward", "ngan/ward/chrme"), 'preset = "ngan/ward/chrme" is unknown; did you mean "ngan/ward/chrome"? It '),

@@ -137,7 +137,8 @@ class Explorer:
                 shown = await asyncio.wrap_future(self.engine.call(take))
             except (ValueError, RuntimeError) as error:
                 path.unlink()
-                raise FileError(one_line(error).replace(str(path), name)) from None
+                kept = "|".join(map(re.escape, (str(path), path.name)))
+                raise FileError(re.sub(kept, lambda _: name, one_line(error))) from None
         except MALFORMED:
             return _refusal(400, "This upload is malformed.")
         except web.HTTPRequestEntityTooLarge:

@@ -66,7 +66,7 @@ def _find(name: str) -> tuple[dict[str, Any], str]:
     if reason := data["left_out"].get(family) or entry["left_out"].get(material):
         raise ValueError(f"There is no preset {name!r}: {reason}.")
     near = closest(str(name), names())
-    hint = f"did you mean {near!r}?" if near else "mi_brdfs.presets() lists them."
+    hint = f"did you mean {near!r}?" if near else "mi-brdfs presets and mi_brdfs.presets() list them."
     raise ValueError(f"There is no preset {name!r}; {hint}")
 
 
