@@ -97,6 +97,8 @@ def test_masks_cut_shapes_out():
 def test_ambient_light_meets_as_much_of_a_mask_as_there_is(inner):
     scene = plate({"type": "lambert", "reflectance": 0.0}, veil(mask(0.3, inner)), ambient=1.0)
     assert shaded(scene, spp=1).mean() == pytest.approx(0.3 * 0.4, rel=1e-5)
+    scene = plate({"type": "lambert", "reflectance": 0.0}, veil(mask(0.5, mask(0.3, inner))), ambient=1.0)
+    assert shaded(scene, spp=1).mean() == pytest.approx(0.5 * 0.3 * 0.4, rel=1e-5)
 
 
 def test_alpha_is_what_masks_hide(variant):

@@ -413,6 +413,13 @@ def test_bitmaps_are_not_used_up():
     assert not report.failures and (np.array(bitmap) == before).all()
 
 
+def test_colours_are_those_of_rgb_variants():
+    """In others a parameter is the coefficients of a spectrum, of which no colour can be made."""
+    mi.set_variant("llvm_ad_spectral")
+    colour = {"type": "rgb", "value": (0.51, 0.66, 0.82)}
+    assert check({"type": "lambert", "reflectance": colour}, only="colours").verdict("colours") == "pass"
+
+
 @pytest.mark.parametrize("fault", ["", "exchanged", "grey pairs"])
 def test_channels_of_a_colour_that_is_no_texture(fault):
     colour = mi.Color3f(0.5)

@@ -285,9 +285,9 @@ def diffuse_reflectance(bsdf: mi.BSDF, si: mi.SurfaceInteraction3f, active: mi.B
     kind, inner = bsdf.class_name(), children(bsdf, mi.BSDF)
     if kind in ("BumpMap", "NormalMap"):  # along their own normal
         return diffuse_reflectance(inner[0], si, active)
-    if kind == "MaskBSDF":
-        through = mi.unpolarized_spectrum(bsdf.eval_null_transmission(si, active))
-        return (1 - through) * diffuse_reflectance(inner[0], si, active)
+    if kind == "MaskBSDF":  # whose eval_null_transmission knows of masks in it
+        (opacity,) = children(bsdf, mi.Texture)
+        return clamp(opacity.eval_1(si, active), 0, 1) * diffuse_reflectance(inner[0], si, active)
     if kind == "TwoSidedBRDF":
         seen = mi.SurfaceInteraction3f(si)
         seen.wi = mi.Vector3f(si.wi.x, si.wi.y, abs(si.wi.z))

@@ -50,8 +50,9 @@ def colours(run: Run, part: Part, outcome: Outcome) -> str:
         raise Skipped("It has no colours.")
     if greys:
         _check_channels(run, outcome, greys)
-        coloured = BSDFProbe(load((run.given or {}) | _coloured(greys)))
-        tell(run, outcome, failures(anywhere(run, coloured), EVERY), "in colours, ")
+        if mi.is_rgb:  # in others, spectral does that
+            coloured = BSDFProbe(load((run.given or {}) | _coloured(greys)))
+            tell(run, outcome, failures(anywhere(run, coloured), EVERY), "in colours, ")
     for parameter in kept:
         _check_kept(run, outcome, parameter)
     return "Each channel follows its own."
