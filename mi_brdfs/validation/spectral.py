@@ -88,7 +88,8 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
         # Of every lane alone: next to a narrow highlight all else is small.
         spread = [relative(it.value.min(axis=1), it.value.max(axis=1), 1e-12).max() for it in expected[""]]
         if max(spread) > 1e-4:
-            tried = {}  # it has colours that cannot be replaced, of which spectral variants make other ones
+            # Spectral variants make other colours of them.
+            tried, without = {}, "Grey is not compared, as it has colours that cannot be replaced. "
     worst = 0.0
     with mi.variant_context(other), skipping(f"It does not work in {other}: "):
         got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
