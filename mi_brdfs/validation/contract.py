@@ -345,7 +345,8 @@ def reflectance(run: Run, part: Part, outcome: Outcome) -> str:
         if diffuse and probe.is_ours:
             wo = on_side(hemisphere(1 << 14, 74, 0), part.sides[0])
             albedo = 2 * np.pi * probe.eval(part, normal, wo).mean(axis=0)
-            _compare(outcome, got, np.minimum(albedo, 1), 0.05, "the albedo at normal incidence is")
+            why = "the albedo at normal incidence, which estimated_albedo of the lobes stands for, is"
+            _compare(outcome, got, np.minimum(albedo, 1), 0.05, why)
     return f"It is {', '.join(f'{channel:.3g}' for channel in got)}."
 
 
