@@ -339,13 +339,17 @@ def greyed_in_light_tracing(own, self, ctx, *given):
     return greyed(value) if ctx.mode == mi.TransportMode.Importance else value
 
 
+def weighed_anew(self, ctx, si, bs, active):
+    """A sample with the density and the weight that its direction has."""
+    value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+    return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+
+
 def drawn_elsewhere(own, self, ctx, si, u, v, active):
     """Weights are right for the directions, which are drawn by other parameters."""
     moved = mi.SurfaceInteraction3f(si)
     moved.uv = mi.Point2f(0.3)
-    bs, _ = own(self, ctx, moved, u, v, active)
-    value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
-    return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+    return weighed_anew(self, ctx, si, own(self, ctx, moved, u, v, active)[0], active)
 
 
 def drawn_otherwise_from_lights(own, self, ctx, si, u, v, active):
@@ -354,8 +358,7 @@ def drawn_otherwise_from_lights(own, self, ctx, si, u, v, active):
     if ctx.mode != mi.TransportMode.Importance:
         return bs, weight
     bs.wo = dr.normalize(bs.wo + mi.Vector3f(0, 0, 0.2))
-    value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
-    return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+    return weighed_anew(self, ctx, si, bs, active)
 
 
 def red_and_blue_exchanged(texture, si, active):

@@ -16,8 +16,8 @@ from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .incidents import all_over
 from .outcome import Outcome, Skipped, skipping
-from .run import Run, of_whole
-from .spectral import AGAIN, anywhere, failures, tell
+from .run import Run, anywhere, failures, of_whole, tell
+from .spectral import AGAIN
 
 COUNT = 2000
 TOLERANCE = 1e-3

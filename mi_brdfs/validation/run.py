@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from typing import Any
 
@@ -115,15 +115,43 @@ class Run:
         return 1e-4 + 3e-6 / max(self.spread(part), 1e-6)
 
 
+# --- Checks that are made again -------------------------------------------------------------------------------------
+
+
+Check = Callable[[Run], Findings]
+"""Yields what it finds of a BSDF."""
+
+
+def anywhere(run: Run, probe: BSDFProbe) -> Run:
+    """Return a run for the BSDF in colours or another variant, and for directions all over the hemisphere alone."""
+    return replace(run, probe=probe, angles=(), given=None)
+
+
+def failures(run: Run, checks: Iterable[Check]) -> dict[Check, list[Finding]]:
+    """Return what fails of some checks, by check."""
+    return {check: [finding for finding in check(run) if finding.verdict == "fail"] for check in checks}
+
+
+def tell(run: Run, outcome: Outcome, failed: dict[Check, list[Finding]], where: str) -> None:
+    """Add the faults that the BSDF has ``where`` it was checked again, and not as it is."""
+    for check, findings in failed.items():
+        if findings and all(finding.verdict != "fail" for finding in check(run)):
+            first = findings[0]
+            outcome.fault(f"{where}{first.check}: {first.message.rstrip('.')}", np.inf)
+
+
+# --- What makes a check ---------------------------------------------------------------------------------------------
+
+
 Judge = Callable[[Run, Part, Outcome], str]
 """What judges a part: it adds faults to an outcome, and returns what to say if there are none; where it raises
 :class:`Skipped`, the part is."""
 
 
-def of_each(parts: Callable[[BSDFProbe], list[Part]]) -> Callable[[Judge], Callable[[Run], Findings]]:
+def of_each(parts: Callable[[BSDFProbe], list[Part]]) -> Callable[[Judge], Check]:
     """Return a decorator that makes a check of some parts of what judges one."""
 
-    def decorated(judge: Judge) -> Callable[[Run], Findings]:
+    def decorated(judge: Judge) -> Check:
         @wraps(judge)
         def check(run: Run) -> Findings:
             for part in parts(run.probe):

@@ -33,9 +33,9 @@ from . import (
 from .incidents import SCATTERED
 from .outcome import Findings, Outcome, Skipped, told
 from .report import Finding, Report
-from .run import Run
+from .run import Check, Run
 
-CHECKS: dict[str, Callable[[Run], Findings]] = {
+CHECKS: dict[str, Check] = {
     check.__name__: check
     for check in (
         values.finite,

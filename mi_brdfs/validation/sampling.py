@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import erfc, pi, sqrt
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from ..probe.arrays import Array, luminance
 from ..probe.bsdf import Part, Samples
 from ..probe.chi_square import in_words
-from .outcome import Findings, Outcome
-from .run import SEED, Run, of_parts
+from .outcome import Outcome
+from .run import SEED, Check, Run, of_parts
 
 CONSTANTS = {
     2: "the probability of one of two lobes",
@@ -110,7 +110,7 @@ def _constant(factors: Sequence[float]) -> str:
     return f"It is off by a factor of {factor:.3g} everywhere: a constant is wrong{perhaps}."
 
 
-def failing(run: Run, part: Part, *checks: Callable[[Run], Findings], anew: bool = True) -> list[str]:
+def failing(run: Run, part: Part, *checks: Check, anew: bool = True) -> list[str]:
     """Return those of the checks that fail for a part: what follows from a fault is not another one. Those that were
     not made before are made ``anew``, or left out."""
     made = {it.check for it in run.found}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -15,9 +14,8 @@ from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
 from . import contract, sampling, values
-from .outcome import Findings, Outcome, Skipped, relative, skipping, told
-from .report import Finding
-from .run import Run, of_whole
+from .outcome import Outcome, Skipped, relative, skipping, told
+from .run import Run, anywhere, failures, of_whole, tell
 from .traced import Parameter, traced_floats
 from .updates import loaded_or_none
 
@@ -95,8 +93,9 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
         got = {words: _load(given).values(wi, wo) for words, given in tried.items()}
         coloured = _load(described | _coloured(greys))
         # Few tests, but judged as strictly as those of this run: they are as many more.
-        one = replace(run, probe=BSDFProbe(coloured.bsdf), angles=(30,), at_random=0, significance=run.level)
-        failed = failures(anywhere(run, coloured), AGAIN) | failures(one, (sampling.pdf, sampling.chi2))
+        every, single = anywhere(run, coloured), BSDFProbe(coloured.bsdf)
+        one = replace(every, probe=single, angles=(30,), at_random=0, significance=run.level)
+        failed = failures(every, AGAIN) | failures(one, (sampling.pdf, sampling.chi2))
         _check_channels(run, outcome, greys)
     tell(run, outcome, failed, f"in {other}, in colours, ")
     for words in tried:
@@ -160,27 +159,6 @@ def _check_kept(run: Run, outcome: Outcome, parameter: Parameter) -> None:
             _check_followed(outcome, it, [each[at].value for each in grey], wi)
         failed = failures(anywhere(run, run.probe), EVERY)
     tell(run, outcome, failed, "in colours, ")
-
-
-Failed = dict[Callable[[Run], Findings], list[Finding]]
-"""What failed, by check."""
-
-
-def anywhere(run: Run, probe: BSDFProbe) -> Run:
-    """Return a run for a BSDF in colours or another variant, and for directions all over the hemisphere alone."""
-    return replace(run, probe=probe, angles=(), given=None)
-
-
-def failures(run: Run, checks: Iterable[Callable[[Run], Findings]]) -> Failed:
-    return {check: [finding for finding in check(run) if finding.verdict == "fail"] for check in checks}
-
-
-def tell(run: Run, outcome: Outcome, failed: Failed, where: str) -> None:
-    """Add faults that the BSDF has ``where`` it was checked again, and not as it is."""
-    for check, findings in failed.items():
-        if findings and all(finding.verdict != "fail" for finding in check(run)):
-            first = findings[0]
-            outcome.fault(f"{where}{first.check}: {first.message.rstrip('.')}", np.inf)
 
 
 def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -> None:
