@@ -338,6 +338,7 @@ FALSE_ALARMS = {
     "a narrow lobe far below the horizon": case(
         "pdf chi2", "lafortune", cx=1.5, cy=-1.5, cz=-1.5, exponent=11546.6, normalization="none"
     ),
+    "a narrow lobe just below the horizon": case("pdf", "lafortune", cx=-1.5, cy=0.3, cz=-0.05, exponent=1e5),
     "a limit on both sides": case("gradients", "twosided", inner={"type": "walter"}),
     "two lobes, both black": case(
         "components", "microfacet", diffuse_reflectance=0.0, int_ior="water", ext_ior="water"

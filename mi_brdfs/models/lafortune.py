@@ -5,7 +5,7 @@ import mitsuba as mi
 
 from ..lobes import LambertLobe, Lobe, PowerLobe
 from ..lobes.power import AxisFrame
-from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p_series, safe_sqrt
+from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p, log1p_series, safe_sqrt
 from ..model import Model, Values
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
@@ -105,7 +105,8 @@ class LafortuneLobe(PowerLobe):
         cos2 = dr.square(frame.axis.z)
         sin2 = dr.maximum(dr.square(frame.axis.x) + dr.square(frame.axis.y), EPSILON)  # 1 - c² would have no digits
         depth = dr.select(frame.axis.z < 0, cos2 * (self.exponent + 1), 0)
-        log_s = 0.5 * dr.log(sin2)
+        # A large exponent needs the digits of log s for an axis near the horizon, too.
+        log_s = 0.5 * dr.select(cos2 < 0.5, log1p(-dr.minimum(cos2, 0.5)), dr.log(sin2))
         # Of what is deeper float32 holds no value, and its steps of t are too coarse.
         return (depth > sin2) & (self.exponent * log_s > -80), log_s, depth
 
