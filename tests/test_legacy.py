@@ -15,6 +15,7 @@ import sys
 import time
 from xml.etree import ElementTree
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -299,6 +300,28 @@ def test_scenes_of_mitsuba_3_are_left_as_they_are(folder, version):
     text = f'<!-- é -->\n<scene version="{version}"><bsdf type="Odd"><float name="alphaU" value="x"/></bsdf></scene>\n'
     (folder / "new.xml").write_text(text, encoding="utf-8")
     assert upgrade(folder / "new.xml") == Upgraded("3", text)
+
+
+@pytest.mark.parametrize("hour, expected", [(9.0, (0.707, 0.455, 0.542)), (12.0, (0, 0.643, 0.766))])
+def test_the_sun_stands_where_it_does(tmp_path, hour, expected):
+    """At 50° north, half a day after the sun crossed the equator: in the south at noon, and 45° east of that about the
+    celestial axis three hours before. In 0.6 east is X, Y is up, and south Z. Clocks and the sun differ by 1.9°."""
+    mi.set_variant("llvm_ad_rgb")
+    at = {"latitude": 50.0, "longitude": 0.0, "timezone": 0.0, "hour": hour}
+    numbers = "".join(f'<float name="{name}" value="{value}"/>' for name, value in at.items())
+    date = "".join(f'<integer name="{k}" value="{v}"/>' for k, v in (("year", 2012), ("month", 3), ("day", 20)))
+    path = tmp_path / "sun.xml"
+    path.write_text(
+        f'<scene version="0.6.0"><shape type="sphere"/><emitter type="sun">{numbers}{date}</emitter></scene>'
+    )
+    with pytest.warns(UserWarning):
+        scene = load_legacy(path)
+    rng = mi.PCG32(size=1000)
+    drawn, light = scene.environment().sample_direction(
+        dr.zeros(mi.Interaction3f), mi.Point2f(rng.next_float32(), rng.next_float32())
+    )
+    towards = np.average(drawn.d.numpy(), axis=1, weights=mi.luminance(light).numpy())
+    assert towards / np.linalg.norm(towards) == pytest.approx(expected, abs=0.04)
 
 
 MISSING = [

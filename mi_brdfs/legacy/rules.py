@@ -351,8 +351,9 @@ def _sunsky(work: Work, element: Element) -> None:
         if aperture < SMALLEST_SUN:
             work.approximated(element, f"the sun is {SMALLEST_SUN}° wide")
     element.type = "sunsky"
-    # Z is up there, and Y in 0.6.
-    element.to_world().children.insert(0, Element("rotate", {"x": "1", "angle": "-90"}))
+    # Z is up there, north -X and east -Y, as in a mirror; in 0.6 Y is up, north -Z and east X.
+    turn = Element("matrix", value="0 -1 0 0 0 0 1 0 1 0 0 0 0 0 0 1")
+    element.to_world().children.insert(0, turn)
 
 
 @rule("sensor", "perspective", "thinlens")
