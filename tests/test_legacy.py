@@ -342,6 +342,36 @@ def test_walls_that_are_turned_inside_out_load_beside_others(load):
     assert len(scene.shapes()) == 3
 
 
+ROUND = [
+    ('<shape type="sphere"><transform name="toWorld"><scale x="-1"/></transform></shape>', (0, 0, 1), (0, 0, 1)),
+    ('<shape type="sphere"><boolean name="flipNormals" value="true"/><transform name="toWorld"><scale z="-1"/>'
+     "</transform></shape>", (0, 0, 1), (0, 0, -1)),
+    ('<shape type="sphere"><point name="center" x="3" y="0" z="0"/><float name="radius" value="0.5"/>'
+     '<transform name="toWorld"><scale value="3"/><rotate z="1" angle="90"/><translate z="2"/></transform></shape>',
+     (0, 3, 3.5), (0, 0, 1)),
+    ('<shape type="cylinder"><transform name="toWorld"><rotate y="1" angle="90"/></transform></shape>', (0, 0, 1),
+     (0, 0, 1)),
+    ('<shape type="cylinder"><transform name="toWorld"><rotate y="1" angle="90"/><scale y="-1"/></transform></shape>',
+     (0, 0, 1), (0, 0, -1)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("shape", "top", "normal"), ROUND)
+def test_spheres_and_cylinders_stand_and_face_as_they_did(load, shape, top, normal):
+    """A centre is not scaled; a mirrored sphere has its normals outside, and a mirrored cylinder inside."""
+    scene, _ = load(shape)
+    above = mi.Point3f(top[0] + (0.1 if "cylinder" in shape else 0), top[1], 10)
+    hit = scene.ray_intersect(mi.Ray3f(above, mi.Vector3f(0, 0, -1)))
+    assert hit.p.numpy().ravel()[2] == pytest.approx(top[2], abs=1e-5)
+    np.testing.assert_allclose(hit.n.numpy().ravel(), normal, atol=1e-3)
+
+
+def test_samples_of_light_and_of_the_bsdf_are_as_many_as_they_were(load):
+    samples = '<integer name="shadingSamples" value="2"/><integer name="emitterSamples" value="4"/>'
+    scene, _ = load(f'<integrator type="direct">{samples}</integrator>')
+    assert re.search(r"emitter_samples = 4,\s*bsdf_samples = 2", str(scene.integrator()))
+
+
 def test_many_parts_of_a_mixture(load):
     grey = np.linspace(0.1, 0.9, 60)
     weights = np.linspace(0.2, 1, 60) / 36.5

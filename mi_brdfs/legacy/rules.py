@@ -361,16 +361,46 @@ def _perspective(work: Work, element: Element) -> None:
     if not element["fov"]:
         element.pop("fov_axis")  # a focal length, by default 50 mm, is that of the diagonal
     if (transform := element["to_world"]) and transform.of("scale", "matrix"):  # which Mitsuba 3 refuses
-        importlib.import_module("mitsuba.scalar_rgb")  # which knows what a transform is
-        text = Element("sensor", {"version": "3.0.0"}, [transform], "perspective").to_xml()
-        try:
-            parsed = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), text)
-            matrix = np.array(parsed.nodes[0].props["to_world"].matrix)
-            u, _, v = np.linalg.svd(matrix[:3, :3])
-        except (RuntimeError, np.linalg.LinAlgError):
-            raise transform.error("it is no transform, or looks nowhere") from None
+        matrix = _matrix(transform)
+        u, _, v = np.linalg.svd(matrix[:3, :3])
         matrix[:3, :3] = u @ v
         transform.children = [Element("matrix", value=" ".join(f"{v:.9g}" for v in matrix.ravel()))]
+
+
+def _matrix(transform: Element) -> Any:
+    """Return the matrix of a transform, shape (4, 4)."""
+    importlib.import_module("mitsuba.scalar_rgb")  # which knows what a transform is
+    text = Element("sensor", {"version": "3.0.0"}, [transform], "perspective").to_xml()
+    try:
+        parsed = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), text)
+        matrix = np.array(parsed.nodes[0].props["to_world"].matrix)
+    except RuntimeError:
+        matrix = np.full((4, 4), np.nan)
+    if not np.isfinite(matrix).all():
+        raise transform.error("it is no transform, or looks nowhere")
+    return matrix
+
+
+@rule("integrator", "direct")
+def _direct(work: Work, element: Element) -> None:
+    kinds = "emitter_samples", "bsdf_samples"
+    if any(element[name] for name in kinds) and (both := element.pop("shading_samples")):
+        for name in kinds:
+            element.put(element[name] or both.copy(name))
+
+
+@rule("shape", "sphere", "cylinder")
+def _round(work: Work, element: Element) -> None:
+    if not (transform := element["to_world"]):
+        return
+    matrix = _matrix(transform)
+    # In 0.6 a mirrored sphere does not turn inside out, and a mirrored cylinder does: the other way round than here.
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        element.set("flip_normals", element.text("flip_normals") != "true")
+    # What scales a sphere does not move its centre.
+    if element["center"] and (scale := float(np.linalg.norm(matrix[:3, 0]))) > 0:
+        transform.children.insert(0, Element("scale", value=written(1 / scale)))
+        element.set("radius", scale * element.number("radius", 1))
 
 
 @rule("shape", "obj")
