@@ -24,7 +24,7 @@ FRESNEL = {
     "f0 .04": ({"f0": 0.04}, lambda c: ref.fresnel_schlick(c, 0.04)[:, None]),
     "f0 .5": ({"f0": 0.5}, lambda c: ref.fresnel_schlick(c, 0.5)[:, None]),
     "f0 .9": ({"f0": 0.9}, lambda c: ref.fresnel_schlick(c, 0.9)[:, None]),
-    "F82": ({"f0": 0.8, "f82": 0.6}, lambda c: ref.fresnel_generalized_schlick(c, 0.8, 0.6)[:, None]),
+    "F82": ({"f0": 0.9, "f82": 0.5}, lambda c: ref.fresnel_generalized_schlick(c, 0.9, 0.5)[:, None]),
     "exponent 1": ({"f0": 0.3, "schlick_exponent": 1.0}, lambda c: 1 - 0.7 * c[:, None]),
     "film": ({"eta": 2.9, "k": 3.0, "film_thickness": 500.0, "film_ior": 1.5}, lambda c: film(c)),
     "gold": (GOLD, lambda c: ref.fresnel_conductor(c[:, None], *(np.array(GOLD[n]["value"]) for n in ("eta", "k")))),
@@ -82,20 +82,20 @@ def test_nor_by_the_published_ways(way):
 
 
 @pytest.mark.parametrize("fresnel", FRESNEL)
-@pytest.mark.parametrize("alpha", [(0.2, 0.2), (0.5, 0.5), (1.0, 1.0), (0.8, 0.2)])
+@pytest.mark.parametrize("alpha", [(0.2, 0.2), (0.5, 0.5), (1.0, 1.0), (0.8, 0.2), (0.4, 0.1)])
 def test_the_colour_is_that_of_a_walk(alpha, fresnel):
     """The albedo is that of simulated walks, to .005 up to 60° and .02 at 80°, besides three standard errors; to more
-    of a film, and of a reflectance that is far from Schlick's. The azimuth is near the axis of smooth facets, which are
-    seen at grazing angles again and again."""
+    of a film, and of a reflectance that is far from Schlick's. The azimuth is that of smooth facets, which are seen at
+    grazing angles again and again."""
     given, function = FRESNEL[fresnel]
-    angles, azimuth = (5, 60, 80), 80
+    angles, azimuth = (5, 45, 60, 80), 90
     ours = albedos(facets("walk", alpha, **given), angles, azimuth)
     rng = np.random.default_rng(1)
     for albedo, theta in zip(ours, angles, strict=True):
         energy, error = walk("ggx", *alpha, direction(theta, azimuth), function, 100_000, rng)
         noise = 3 * np.sqrt((error**2).sum(axis=0))
-        near = {"film": 0.012, "exponent 1": 0.03}.get(fresnel, 0.005)
-        assert (abs(albedo - energy.sum(axis=0)) < (near if theta <= 60 else max(near, 0.02)) + noise).all()
+        near, far = {"film": (0.025, 0.03), "exponent 1": (0.02, 0.03)}.get(fresnel, (0.005, 0.02))
+        assert (abs(albedo - energy.sum(axis=0)) < (near if theta <= 60 else far) + noise).all()
 
 
 @pytest.mark.parametrize(

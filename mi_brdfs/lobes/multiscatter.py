@@ -69,22 +69,28 @@ class MultipleScattering(Lobe):
 
 
 class WalkLobe(MultipleScattering):
-    """The colour of a walk that is reflected at wi's end and at wo's by F₁, and in between by F₂, which are means of F,
+    """The colour of a walk that is reflected at wi's end and at wo's by R, and in between by F₂, the mean of F there,
     and escapes at the second reflection with probability p, later with q:
 
-        C = ρ F₁(wi) F₁(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
+        C = ρ R(wi) R(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
+        R = (F₁ + F̄₁)² / (4 F̄₁)
 
-    p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk.
+    p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁ is F̄₁ and what F
+    differs by from its means both at the first and at a later reflection of light from that direction. Shared between
+    the two, as on facets that are seen at grazing angles again and again, that makes their product ((F₁ + F̄₁)/2)²,
+    which is R(wi) times the mean of R(wo).
     """
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
-        between, third = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip), self.mean.third
+        mean = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip)
+        between, third = Fresnel.mean(self.fresnel, *self.mean.between), self.mean.third
         later = between * third / (1 - between * (1 - third))
-        return reflectance * later, reflectance * (1 - later)
+        scale = reflectance / dr.square(4 * dr.maximum(mean, EPSILON))
+        return mean, scale * later, scale * (1 - later)
 
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        later, sooner = self.colours
-        first, last = (Fresnel.mean(self.fresnel, end.schlick, end.dip) for end in (i, o))
+        mean, later, sooner = self.colours
+        first, last = (dr.square(Fresnel.mean(self.fresnel, end.schlick, end.dip) + mean) for end in (i, o))
         return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
 
 

@@ -38,12 +38,12 @@ BENDS = {"ggx": ((5, 4), (3, 8)), "beckmann": ((6, 4), (6, 4)), "blinn": ((3, 8)
 """Numbers c and d of k = c/(1 + d (αu² + αv²)/2), for the separable and the correlated term, by which polynomials of
 low degree do."""
 COUNTS = {
-    "lost": (7, 5, 3), "root": (1,), "second": (4, 2, 1), "schlick": (4, 2, 1), "means": (2,), "dip": (4, 2, 1),
-    "mean dip": (1,),
+    "lost": (7, 5, 3), "root": (1,), "second": (4, 2), "schlick": (4, 2), "means": (3,), "dip": (4, 2),
+    "mean dips": (2,),
 }  # fmt: skip
 """How many entries the table has: for each polynomial, the coefficients of those by which 1, y, y² … are multiplied, in
-x for what is lost, and in 1 - cosθ for the others, where 1 - cosθ is a factor of y, too; and for the means, the root of
-what is lost first. Eight in a row are looked up together, if one of them is needed."""
+x for what is lost, and in 1 - cosθ for the others, where :func:`evened` y takes the place of y, with a factor 1 - cosθ;
+and for the means, the root of what is lost first. Eight in a row are looked up together, if one of them is needed."""
 ISOTROPIC = np.concatenate([np.arange(sum(counts)) < counts[0] for counts in COUNTS.values()])
 """Which of them isotropic facets have."""
 
@@ -69,9 +69,10 @@ class MeanEscape(NamedTuple):
     third: mi.Float
     """The part that escapes at the third and, about, at each later reflection of what reaches it."""
     schlick: mi.Float
-    """The mean of (1 - cosθ_d)⁵ at reflections between the first and the last, and"""
     dip: mi.Float
-    """of cosθ_d (1 - cosθ_d)⁶."""
+    """Those of :class:`Escape`."""
+    between: tuple[mi.Float, mi.Float]
+    """The means of both at reflections between the first and the last."""
 
     @property
     def second(self) -> mi.Float:
@@ -97,8 +98,8 @@ class Walks:
         self.rows, left = {}, iter(uniform("walks", table.eval(texels)))
         for name, counts in COUNTS.items():
             self.rows[name] = [list(itertools.islice(left, n)) for n in counts[: 1 if self.isotropic else None]]
-        (root,), (third, schlick), (dip,) = (self.rows[name][0] for name in ("root", "means", "mean dip"))
-        self.mean = MeanEscape(dr.square(root), third, schlick, dip)
+        (root,), (third, schlick, end), dips = (self.rows[name][0] for name in ("root", "means", "mean dips"))
+        self.mean = MeanEscape(dr.square(root), third, end, dips[1], (schlick, dips[0]))
 
     def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
@@ -115,10 +116,16 @@ class Walks:
         lost = horner([horner(row, x) for row in self.rows["lost"]], y)
         # The others change with the angle itself, and at the normal not with the azimuth.
         versine, others = 1 - v.z, []
+        skewed = versine * evened(y)
         for name in Escape._fields[1:]:
             first, *rest = (horner(row, versine) for row in self.rows[name])
-            others.append(dr.fma(versine * y, horner(rest, y), first) if rest else first)
+            others.append(dr.fma(skewed, rest[0], first) if rest else first)
         return Escape(dr.maximum(lost, 0), *others)
+
+
+def evened(y: Any) -> Any:
+    """Return (α² - αu αv)/(α² + αu αv), y for a SKEW of 1, in which the light that is left changes evenly."""
+    return (1 + SKEW) * y / (2 - (1 - SKEW) * y)
 
 
 def horner(coefficients: Sequence[Any], x: Any) -> Any:

@@ -18,7 +18,7 @@ from harness import parser
 from scipy.interpolate import RegularGridInterpolator
 from scipy.special import erfc, erfinv
 
-from mi_brdfs.microfacet.escape import BENDS, COUNTS, FILE, ISOTROPIC, ROUGHEST, SKEW
+from mi_brdfs.microfacet.escape import BENDS, COUNTS, FILE, ISOTROPIC, ROUGHEST, SKEW, evened
 
 import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
 import mitsuba as mi  # isort: skip
@@ -27,7 +27,7 @@ import numpy as np  # isort: skip
 ALPHAS, RATIOS = 36, 27
 BRIGHTER = 0.008
 """What polynomials may add to E where they err most, on facets of extreme anisotropy."""
-WALK_COSINES, WALK_ALPHAS = 13, 9
+WALK_COSINES, WALK_ALPHAS = 15, 10
 """Nodes of the walks: what they say changes less, and splines are drawn through it."""
 WALKS = 1 << 15
 REFLECTIONS = 10
@@ -43,14 +43,13 @@ def alphas(places: np.ndarray) -> np.ndarray:
     return np.maximum(x / (1 - x), 1e-3)
 
 
-def direction(cos: np.ndarray, along: np.ndarray, across: np.ndarray, rho2: float) -> tuple[np.ndarray, ...]:
-    """Return ``(cosθ, φ, αu, αv)`` for a stretched cosine, the roughness along the direction and across, and ρ²."""
+def azimuth(along: np.ndarray, across: np.ndarray, rho2: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return ``(φ, αu, αv)`` for the roughness along the direction and across, and ρ²."""
     rho = np.sqrt(rho2) * along * across
     mean, half = (along**2 + across**2) / 2, np.hypot((along**2 - across**2) / 2, rho)
     u2 = mean + half
     v2 = along**2 * across**2 * (1 - rho2) / u2
-    tan = np.sqrt(1 / np.clip(cos, 1e-3, 1 - 1e-6) ** 2 - 1) / along
-    return 1 / np.hypot(1, tan), 0.5 * np.arctan2(2 * rho, along**2 - across**2), np.sqrt(u2), np.sqrt(v2)
+    return 0.5 * np.arctan2(2 * rho, along**2 - across**2), np.sqrt(u2), np.sqrt(v2)
 
 
 # --- The first reflection -------------------------------------------------------------------------------------------
@@ -238,12 +237,12 @@ def _means(values: mi.Float, count: int) -> np.ndarray:
 
 
 def walk_tables(shape: str, count: int) -> dict[str, RegularGridInterpolator]:
-    """Return what :func:`walks` finds, by the places of stretched cosine and roughness along and across, as the
-    coefficients of a line in ρ²: shape (…, 2, channels)."""
+    """Return what :func:`walks` finds, by the root of the cosine and the places of the roughness along and across, as
+    the coefficients of a line in ρ²: shape (…, 2, channels)."""
     rough = alphas(np.linspace(0, 1, WALK_ALPHAS))
     nodes = np.linspace(0, 1, WALK_COSINES), rough, rough, CORRELATIONS
     grid = [each.ravel() for each in np.meshgrid(*nodes, indexing="ij")]
-    settings = [each.ravel() for each in np.broadcast_arrays(*direction(*grid[:3], rho2=grid[3]))]
+    settings = [np.clip(grid[0] ** 2, 1e-3, 1 - 1e-6), *azimuth(*grid[1:])]
     found = [walks(shape, *(each[k : k + 64] for each in settings), count) for k in range(0, len(grid[0]), 64)]
     axes = np.linspace(0, 1, WALK_COSINES), *2 * [np.linspace(0, 1, WALK_ALPHAS)]
     tables = {}
@@ -292,13 +291,14 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
         means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
-        weights = 0.02 + lost_at(above, polynomial, bend)
+        # What they colour may err by a quarter at 60° of what it may near the horizon.
+        weights = (0.02 + lost_at(above, polynomial, bend)) * np.where(above.cos > 0.4, 3, 1)
         others = [
             np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
             for name, values in zip(("second", "schlick", "dip"), later, strict=True)
         ]
         second, schlick, dip = others
-        entries.append(np.concatenate([polynomial, means[:1], second, schlick, means[1:3], dip, means[3:]]))
+        entries.append(np.concatenate([polynomial, means[:1], second, schlick, means[1:4], dip, means[4:]]))
     return entries
 
 
@@ -336,6 +336,8 @@ class Places(NamedTuple):
 
     cos: np.ndarray
     phi: np.ndarray
+    shortened: np.ndarray
+    """The cosine in the stretched space."""
     at: np.ndarray
     """Places in the tables of walks."""
     rho2: np.ndarray
@@ -354,7 +356,8 @@ class Places(NamedTuple):
         shortened = 1 / np.sqrt(1 + along2 * tan2)
         at = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
         rho2 = np.maximum(1 - (alpha_u * alpha_v) ** 2 / (along2 * across2), 0)
-        return cls(cos, phi, np.stack([shortened, *at], axis=-1), rho2, skewed(along2 / (alpha_u * alpha_v)))
+        at = np.stack([np.sqrt(cos), *at], axis=-1)
+        return cls(cos, phi, shortened, at, rho2, skewed(along2 / (alpha_u * alpha_v)))
 
     @classmethod
     def joined(cls, *places: Places) -> Places:
@@ -363,9 +366,10 @@ class Places(NamedTuple):
     def terms(self, name: str, bend: float = 1) -> np.ndarray:
         x, factor = 1 - self.cos, 1 - self.cos
         if name == "lost":
-            x, factor = 2 * self.at[:, 0] / (self.at[:, 0] + bend * (1 - self.at[:, 0])) - 1, np.ones(len(self.cos))
+            x, factor = 2 * self.shortened / (self.shortened + bend * (1 - self.shortened)) - 1, np.ones(len(self.cos))
+        y = self.y if name == "lost" else evened(self.y)
         powers = [(i, j) for j, count in enumerate(COUNTS[name]) for i in range(count)]
-        return np.stack([x**i * self.y**j * factor ** min(j, 1) for i, j in powers], axis=-1)
+        return np.stack([x**i * y**j * factor ** min(j, 1) for i, j in powers], axis=-1)
 
 
 def lost_at(places: Places, polynomial: np.ndarray, bend: float) -> np.ndarray:
@@ -401,9 +405,10 @@ def after_the_first(
         paths = at(places, "paths")
         return paths[:2], TYPICAL * (paths[2:4] - between * paths[4])
 
-    (first, later), (_, later_everywhere) = moments(places), moments(everywhere)
+    (first, later), (first_everywhere, later_everywhere) = moments(places), moments(everywhere)
     colours = first + later - mean(later_everywhere, loss)
-    means = np.concatenate([[np.sqrt(np.sum(loss))], *third, *between])
+    colour_means = np.hstack([between, mean(first_everywhere, loss)])
+    means = np.concatenate([[np.sqrt(np.sum(loss))], *third, *colour_means])
     return means, *(at(places, "second") - 0.5 * second), *colours
 
 
