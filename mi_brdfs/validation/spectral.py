@@ -187,7 +187,7 @@ def _error(got: Array, expected: Array) -> float:
 
 
 def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
-    """Return the colours among constant parameters, by name, and how bright they are: what is asked for a spectrum."""
+    """Return the colours among constant parameters, what is asked for a spectrum, by name, and how bright they are."""
     params, asked = mi.traverse(probe.bsdf), set[str]()
 
     class Asking(mi.Texture):
@@ -217,7 +217,10 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
             BSDFProbe(asking).values(wi, wi)
     except (RuntimeError, TypeError):
         return {}
-    return {name: grey for name, grey in greys.items() if name in asked and grey > 0}
+    greys = {name: grey for name, grey in greys.items() if name in asked and grey > 0}
+    # What is at the low end of its range has brighter hues only.
+    dark = [name for name, colour in _coloured(greys).items() if loaded_or_none(given | {name: colour}) is None]
+    return greys | {name: greys[name] / min(HUE) for name in dark}
 
 
 def _tried(probe: BSDFProbe, given: dict[str, Any], greys: dict[str, float]) -> dict[str, dict[str, Any]]:
