@@ -59,12 +59,13 @@ class Shading(Plugin):
     * At the end, ``tonemap`` = reinhard maps each channel x of a pixel to x/(1+x), and ``clamp`` cuts off values above
       1, of which reinhard leaves none.
 
-    Rays go through pixel centres, except that those of an ``irradiancemeter`` spread over it. So if all lights are
-    points, spots or directional, or area lights that shine from their centre (rectangles, disks or spheres), a picture
-    in rgb or mono is the same for any seed and number of samples; for smooth edges, render larger and scale down. Each
-    sample draws one point of other area lights and of environments, and spectral variants draw wavelengths. The tone
-    map and the clamp apply to the mean of all samples of a pixel, however many passes draw them. Within ``aov`` the
-    rays are that integrator's, and they apply to each sample.
+    Rays go through pixel centres, except that those of an ``irradiancemeter`` spread over it, and those of a
+    ``thinlens`` over its aperture. So if all lights are points, spots or directional, or area lights that shine from
+    their centre (rectangles, disks or spheres), a picture of other sensors in rgb or mono is the same for any seed and
+    number of samples; for smooth edges, render larger and scale down. Each sample draws one point of other area lights
+    and of environments, and spectral variants draw wavelengths. The tone map and the clamp apply to the mean of all
+    samples of a pixel, however many passes draw them. Within ``aov`` the rays are that integrator's, and they apply to
+    each sample.
 
     Light passes straight through surfaces as far as their BSDFs allow (``null``, ``mask``, ``thindielectric``, and
     ``blendbsdf`` of them): objects behind are visible, and shadows are lighter by as much. ``dielectric`` is opaque.

@@ -130,7 +130,7 @@ def plugin(kind: str, type: str, *children: Element, **properties: Any) -> Eleme
 
 
 def floats(text: str) -> list[float]:
-    return [float(number) for number in re.split(r"[,\s]+", text.strip(", \t\n"))]
+    return [float(number) for number in re.split(r"[,;\s]+", text.strip(",; \t\n"))]
 
 
 def written(value: Any) -> str:
