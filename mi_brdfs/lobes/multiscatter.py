@@ -75,10 +75,10 @@ class WalkLobe(MultipleScattering):
         C = ρ R(wi) R(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
         R = (F₁ + F̄₁)² / (4 F̄₁)
 
-    p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁ is F̄₁ and what F
-    differs by from its means both at the first and at a later reflection of light from that direction. Shared between
-    the two, as on facets that are seen at grazing angles again and again, that makes their product ((F₁ + F̄₁)/2)²,
-    which is R(wi) times the mean of R(wo).
+    p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁(w) is F̄₁ and what F
+    differs by from its means both at the first and at a later reflection of light from w. On facets that are seen at
+    grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about R(wi)
+    times the mean of R(wo).
     """
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
