@@ -77,8 +77,8 @@ class WalkLobe(MultipleScattering):
 
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁(w) is F̄₁ and what F
     differs by from its means both at the first and at a later reflection of light from w. On facets that are seen at
-    grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about R(wi)
-    times the mean of R(wo).
+    grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about
+    R(wi) times the mean of R(wo).
     """
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
