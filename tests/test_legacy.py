@@ -372,6 +372,18 @@ def test_samples_of_light_and_of_the_bsdf_are_as_many_as_they_were(load):
     assert re.search(r"emitter_samples = 4,\s*bsdf_samples = 2", str(scene.integrator()))
 
 
+@pytest.mark.parametrize("reflectance", ["0.5", "0.9, 0.5, 0.2"])
+def test_a_coat_over_a_diffuse_base(load, reflectance):
+    """Light is refracted in and out once, and not reflected inside."""
+    diffuse = f'<bsdf type="diffuse"><rgb name="reflectance" value="{reflectance}"/></bsdf>'
+    scene, _ = load(in_shape(f'<bsdf type="coating">{diffuse}</bsdf>'))
+    index = 1.5046 / 1.000277
+    transmitted = [1 - reference.fresnel_dielectric(w[:, 2], index) for w in (WI, WO)]
+    expected = transmitted[0] * transmitted[1] * WO[:, 2] / (np.pi * index**2)
+    albedo = np.fromstring(reflectance, sep=",")
+    np.testing.assert_allclose(evaluated(scene.shapes()[0].bsdf()), expected[:, None] * albedo * [1, 1, 1], rtol=1e-4)
+
+
 def test_many_parts_of_a_mixture(load):
     grey = np.linspace(0.1, 0.9, 60)
     weights = np.linspace(0.2, 1, 60) / 36.5

@@ -117,7 +117,7 @@ def _bounded(work: Work, element: Element) -> Element:
     if element.type == "roughplastic" and (alpha := element["alpha"]) and alpha.tag not in ("float", "integer"):
         element.set("alpha", 0.1)
         work.approximated(element, "alpha of roughplastic cannot be a texture; it is .1")
-    names = sorted(name for name in element.entry.known if name.endswith(("reflectance", "transmittance")))
+    names = sorted(name for name in element.entry.known if name.endswith(("reflectance", "transmittance", "base_color")))
     defaults = {"diffuse_reflectance": 0.5, "specular_reflectance": 0.2}
     bitmaps: dict[Element, list[float]] = {}
     for group in [names] if element.type in ("phong", "ward") else [[name] for name in names if element[name]]:
@@ -288,19 +288,18 @@ def _coating(work: Work, element: Element) -> Element:
     element.children.remove(base)
     inner, was = work.resolved(base), element.type
     glass, air = element["int_ior"] or prop("int_ior", 1.5046), element["ext_ior"] or prop("ext_ior", 1.000277)
-    rough = was.removesuffix("coating")
+    rough, index = was.removesuffix("coating"), _index(glass) / _index(air)
+    mean_reflectance = importlib.import_module("mitsuba.scalar_rgb").fresnel_diffuse_reflectance
     if inner.type in ("diffuse", "roughdiffuse"):
-        # The coat of a diffuse base is what plastic is.
+        # The coat of a diffuse base is what plastic is, but that light is not sent back and forth between them.
         work.approximated(element, f"{was} over {inner.type} is plastic, without absorption in the coat")
         element.type = f"{rough}plastic"
         element.put(glass)
-        element.set("nonlinear", True)
-        if reflectance := inner["reflectance"]:
-            element.put(reflectance.copy("diffuse_reflectance"))
+        reflectance = work.resolved(inner["reflectance"] or prop("reflectance", [0.5]))
+        element.put(times(reflectance.copy("diffuse_reflectance"), [1 - mean_reflectance(1 / index)]))
         return _bounded(work, element)
     element.pop("int_ior", "ext_ior")
-    index = _index(glass) / _index(air)
-    share = importlib.import_module("mitsuba.scalar_rgb").fresnel_diffuse_reflectance(index)
+    share = mean_reflectance(index)
     work.approximated(element, f"{was} is a mixture with a mirror, of the coat's mean reflectance, at all angles")
     element.type = f"{rough}conductor"
     element.set("material", "none")
