@@ -117,7 +117,9 @@ def _bounded(work: Work, element: Element) -> Element:
     if element.type == "roughplastic" and (alpha := element["alpha"]) and alpha.tag not in ("float", "integer"):
         element.set("alpha", 0.1)
         work.approximated(element, "alpha of roughplastic cannot be a texture; it is .1")
-    names = sorted(name for name in element.entry.known if name.endswith(("reflectance", "transmittance", "base_color")))
+    names = sorted(
+        name for name in element.entry.known if name.endswith(("reflectance", "transmittance", "base_color"))
+    )
     defaults = {"diffuse_reflectance": 0.5, "specular_reflectance": 0.2}
     bitmaps: dict[Element, list[float]] = {}
     for group in [names] if element.type in ("phong", "ward") else [[name] for name in names if element[name]]:
