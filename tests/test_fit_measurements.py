@@ -13,6 +13,7 @@ from support import LOFT, interaction, numbers, shared
 
 import mi_brdfs
 from mi_brdfs.fit import METRICS, FileError, FitError, fit, observe
+from mi_brdfs.fit.lanes import Lanes
 from mi_brdfs.fit.observations import solid_angles
 from mi_brdfs.fit.unknowns import configurations
 from mi_brdfs.lobes import LambertLobe
@@ -273,6 +274,23 @@ def test_materials_do_not_depend_on_others():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("where", ["between kernels", "within one"])
+def test_what_is_broken_off_does_no_harm_while_its_traceback_lives(where, ward, monkeypatch):
+    """The plugin that was fitted is part of the picture's kernel."""
+    mi.set_variant("llvm_ad_rgb")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    if where == "within one":
+        monkeypatch.setattr(Lanes, "_tangent", stop)
+    with pytest.raises(KeyboardInterrupt) as kept:
+        fit(ward, "burley", starts=2, progress=stop)
+    scene = mi.load_dict(mi_brdfs.preview_scene({"type": "lambert"}))
+    assert 0.05 < mi.render(scene, spp=1).numpy().mean() < 1
+    del kept
+
+
 def test_runs_without_a_variant_for_it(ward):
     with mi.variant_context("scalar_rgb"):
         (it,) = fit(ward, "ward", starts=1)

@@ -293,10 +293,12 @@ class Session:
                     found = {"bsdf": plain(best.bsdf), "model": best.model, "error": error}
                     found["text"] = "\n".join(best.remarks())
                 except Disturbed:
-                    yield
+                    pass
                 except (RuntimeError, ValueError) as error:
                     found = {}
                     skipped.append(one_line(error))
+                if found is None:  # not within except, which would keep what was fitted alive
+                    yield
             if self._fits is own:  # and is not cancelled
                 self.send(text(type="fit", done=past + 1, total=len(models), **found))
             yield

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..mitsuba import llvm
 from ..mitsuba.fastest import fastest
-from ..probe.arrays import Array, context, floats, interaction, numbers, per_lane, vectors
+from ..probe.arrays import Array, context, floats, held, interaction, numbers, per_lane, vectors
 from ..probe.directions import hemisphere
 from ..variants import activated
 from .observations import FitError
@@ -75,13 +75,12 @@ class Lanes:
         counts = [len(wi) for wi, _ in pairs]
         si, wo = interaction(np.concatenate([wi for wi, _ in pairs])), vectors(np.concatenate([wo for _, wo in pairs]))
         dr.make_opaque(si)
-        inputs = self._set(np.repeat(np.asarray(settings, np.float32), counts, axis=0), bool(sweeps))
-        value = self.bsdf.eval(context(), si, wo, True)
-        tangents = [self._tangent(value, inputs, sweep) for sweep in sweeps]
-        value = dr.detach(value)
-        dr.eval(value, tangents)
-        for texture in self.textures.values():
-            texture.value = None  # what lives on is part of other kernels
+        inputs = self._inputs(np.repeat(np.asarray(settings, np.float32), counts, axis=0), bool(sweeps))
+        with held(self.textures, inputs):
+            value = self.bsdf.eval(context(), si, wo, True)
+            tangents = [self._tangent(value, inputs, sweep) for sweep in sweeps]
+            value = dr.detach(value)
+            dr.eval(value, tangents)
         found = self._array(value)
         jacobian = np.zeros((*found.shape, len(self.configuration.unknowns) if sweeps else 0), np.float32)
         for sweep, tangent in zip(sweeps, tangents, strict=True):
@@ -99,15 +98,15 @@ class Lanes:
             return mi.Float(numbers[0])
         return mi.Color3f(numbers if len(numbers) == 3 else numbers * 3)
 
-    def _set(self, settings: Array, differentiable: bool) -> dict[str, mi.Float | mi.Color3f]:
-        """Give the textures the values of a setting for each lane, and return these."""
+    def _inputs(self, settings: Array, differentiable: bool) -> dict[str, mi.Float | mi.Color3f]:
+        """Return the values of the textures for a setting in each lane."""
         inputs = {}
-        for name, texture in self.textures.items():
+        for name in self.textures:
             value = self._typed(name, [floats(settings[:, k]) for k in self.configuration.indices(name)])
             dr.make_opaque(value)
             if differentiable:
                 dr.enable_grad(value)
-            inputs[name] = texture.value = value
+            inputs[name] = value
         return inputs
 
     def _tangent(self, value: mi.Color3f, inputs: dict[str, mi.Float | mi.Color3f], sweep: list[int]) -> mi.Color3f:

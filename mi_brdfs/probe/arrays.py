@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import drjit as dr
@@ -86,6 +87,19 @@ def per_lane() -> mi.Texture:
             return self.value
 
     return Lanes()
+
+
+@contextmanager
+def held(textures: Mapping[str, mi.Texture], values: Mapping[str, Any]) -> Iterator[None]:
+    """Give textures of :func:`per_lane` values, and afterwards zeros: a plugin that lives on, be it in a traceback
+    alone, is part of other kernels."""
+    try:
+        for name, texture in textures.items():
+            texture.value = values[name]
+        yield
+    finally:
+        for name, texture in textures.items():
+            texture.value = type(values[name])(0)
 
 
 def pinned(texture: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None = None) -> mi.Texture:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from .arrays import Array, floats, luminance, per_lane
+from .arrays import Array, floats, held, luminance, per_lane
 from .bsdf import BSDFProbe
 from .directions import angles_of, direction
 from .parameter_space import VIEW, accepted, axes, load, view
@@ -126,9 +126,6 @@ class _Search:
 
     def _batch(self, points: Array, log2_count: int, seed: int) -> Array:
         numbers = self._numbers(points)
-        for name, texture in self.textures.items():
-            texture.value = floats(np.repeat(numbers[name], 1 << log2_count))
-        found = albedos(self.bsdf, view(numbers["cosine"], numbers["azimuth"]), log2_count, seed)
-        for texture in self.textures.values():
-            texture.value = None  # what lives on is part of other kernels
-        return found
+        lanes = {name: floats(np.repeat(numbers[name], 1 << log2_count)) for name in self.textures}
+        with held(self.textures, lanes):
+            return albedos(self.bsdf, view(numbers["cosine"], numbers["azimuth"]), log2_count, seed)
