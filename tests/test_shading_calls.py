@@ -188,6 +188,9 @@ def test_bad_scenes():
         mi.render(plate(WHITE, lamp("cylinder"), area_lights="centre"))
     with refused('area_lights = "centre" knows lights of one radiance, but that of a light is a texture'):
         mi.render(plate(WHITE, lamp("disk", {"type": "checkerboard"}), area_lights="centre"))
+    for inward in ({"flip_normals": True}, {"to_world": mi.ScalarTransform4f().scale([-1, 1, 1])}):
+        with refused('area_lights = "centre" knows spheres that shine outward'):
+            mi.render(plate(WHITE, lamp("sphere") | inward, area_lights="centre"))
 
 
 def test_films_without_colours_are_refused():

@@ -207,6 +207,11 @@ class Shading(Plugin):
                     'shading: area_lights = "centre" knows lights of one radiance, but that of a light is a texture; '
                     'use area_lights = "sample".'
                 )
+            if shape == "Sphere" and light.get_shape().has_flipped_normals():
+                raise ParameterError(
+                    'shading: area_lights = "centre" knows spheres that shine outward, but a light is one that shines '
+                    'inward, from all around; use area_lights = "sample".'
+                )
             return mi.Point2f(*CENTRES[shape])
         return sampler.next_2d()
 
