@@ -67,7 +67,7 @@ def test_area_lights_may_shine_from_their_centre(shape, solid_angle):
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "scalar_rgb"])
 def test_spheres_shine_from_their_centre_as_points_do(name):
-    """Of intensity π r² L; and within one, as the point that its sample finds does for all of it."""
+    """Of intensity π r² L."""
     radiance, height = 3.0, 40.0
     settings = {"area_lights": "centre", "clamp": False}
     with mi.variant_context(name):
@@ -76,8 +76,6 @@ def test_spheres_shine_from_their_centre_as_points_do(name):
             point = {"type": "point", "position": [0, 0, height], "intensity": intensity}
             sphere = lamp("sphere", radiance, T().translate([0, 0, height]).scale(radius))
             assert shade(WHITE, sphere, **settings) == pytest.approx(shade(WHITE, point, clamp=False), rel=1e-5)
-        around = lamp("sphere", radiance, T().scale(40)) | {"flip_normals": True}
-        assert shade(WHITE, around, **settings) == pytest.approx(ALBEDO * 4 * np.pi * radiance, rel=1e-3)
 
 
 @pytest.mark.usefixtures("llvm_rgb")

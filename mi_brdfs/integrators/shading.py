@@ -61,11 +61,11 @@ class Shading(Plugin):
 
     Rays go through pixel centres, except that those of an ``irradiancemeter`` spread over it, and those of a
     ``thinlens`` over its aperture. So if all lights are points, spots or directional, or area lights that shine from
-    their centre (rectangles, disks or spheres), a picture of other sensors in rgb or mono is the same for any seed and
-    number of samples; for smooth edges, render larger and scale down. Each sample draws one point of other area lights
-    and of environments, and spectral variants draw wavelengths. The tone map and the clamp apply to the mean of all
-    samples of a pixel, however many passes draw them. Within ``aov`` the rays are that integrator's, and they apply to
-    each sample.
+    their centre (rectangles, disks or spheres, from outside), a picture of other sensors in rgb or mono is the same for
+    any seed and number of samples; for smooth edges, render larger and scale down. Each sample draws one point of other
+    area lights and of environments, and spectral variants draw wavelengths. The tone map and the clamp apply to the
+    mean of all samples of a pixel, however many passes draw them. Within ``aov`` the rays are that integrator's, and
+    they apply to each sample.
 
     Light passes straight through surfaces as far as their BSDFs allow (``null``, ``mask``, ``thindielectric``, and
     ``blendbsdf`` of them): objects behind are visible, and shadows are lighter by as much. ``dielectric`` is opaque.
@@ -176,7 +176,7 @@ class Shading(Plugin):
             ds, irradiance = light.sample_direction(si, self._place(light, sampler), hit)
             irradiance, lit = mi.unpolarized_spectrum(irradiance), select(ds.pdf > 0, hit, False)
             if self.area_lights == "centre":
-                irradiance *= mean_cosine(light, si, ds)
+                irradiance *= mean_cosine(light, ds)
             if self.shadows and veils:
                 through = straight_through(scene, si, ds, light, lit)
                 irradiance, lit = irradiance * through, select(dr.any(through > 0), lit, False)
@@ -220,15 +220,13 @@ CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
 """The sample that yields the centre of a shape; a sphere samples the cone that it subtends."""
 
 
-def mean_cosine(light: mi.Emitter, si: mi.SurfaceInteraction3f, ds: mi.DirectionSample3f) -> mi.Float:
-    """Return the factor from a light's sample to its irradiance at normal incidence: outside a sphere, the mean cosine
-    over its cone, (1 + cosθ_max) / 2, as the sample is the axis alone; its density is 1 / (2π (1 - cosθ_max))."""
+def mean_cosine(light: mi.Emitter, ds: mi.DirectionSample3f) -> mi.Float:
+    """Return the factor from a light's sample to its irradiance at normal incidence: for a sphere, the mean cosine over
+    its cone, (1 + cosθ_max) / 2, as the sample is the axis alone; its density is 1 / (2π (1 - cosθ_max))."""
     shape = light.get_shape()
     if shape is None or shape.class_name() != "Sphere":
         return mi.Float(1)
-    box = shape.bbox()
-    outside = dr.norm(si.p - box.center()) > box.extents().x / 2
-    return dr.select(outside, 1 - 1 / (4 * dr.pi * dr.maximum(ds.pdf, dr.inv_two_pi)), 1)
+    return 1 - 1 / (4 * dr.pi * dr.maximum(ds.pdf, dr.inv_two_pi))
 
 
 # --- Occlusion ---------------------------------------------------------------------------------------------
