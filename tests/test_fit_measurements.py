@@ -273,7 +273,6 @@ def test_materials_do_not_depend_on_others():
     assert alone == together
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("where", ["between kernels", "within one"])
 def test_what_is_broken_off_does_no_harm_while_its_traceback_lives(where, ward, monkeypatch):
     """The plugin that was fitted is part of the picture's kernel."""
@@ -291,6 +290,7 @@ def test_what_is_broken_off_does_no_harm_while_its_traceback_lives(where, ward, 
     del kept
 
 
+@pytest.mark.slow
 def test_runs_without_a_variant_for_it(ward):
     with mi.variant_context("scalar_rgb"):
         (it,) = fit(ward, "ward", starts=1)

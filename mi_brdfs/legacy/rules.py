@@ -374,13 +374,14 @@ def _matrix(transform: Element) -> Any:
     """Return the matrix of a transform, shape (4, 4)."""
     importlib.import_module("mitsuba.scalar_rgb")  # which knows what a transform is
     text = Element("sensor", {"version": "3.0.0"}, [transform], "perspective").to_xml()
+    refusal = transform.error("it is no transform, or looks nowhere")
     try:
         parsed = mi.parser.parse_string(mi.parser.ParserConfig("scalar_rgb"), text)
-        matrix = np.array(parsed.nodes[0].props["to_world"].matrix)
     except RuntimeError:
-        matrix = np.full((4, 4), np.nan)
+        raise refusal from None
+    matrix = np.array(parsed.nodes[0].props["to_world"].matrix)
     if not np.isfinite(matrix).all():
-        raise transform.error("it is no transform, or looks nowhere")
+        raise refusal
     return matrix
 
 

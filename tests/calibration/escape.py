@@ -291,7 +291,7 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
         polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
         means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
-        # What they colour may err by a quarter at 60° of what it may near the horizon.
+        # What they colour is to err less up to some 60° than near the horizon.
         weights = (0.02 + lost_at(above, polynomial, bend)) * np.where(above.cos > 0.4, 3, 1)
         others = [
             np.linalg.lstsq(above.terms(name) * weights[:, None], values * weights, rcond=None)[0]
@@ -354,9 +354,9 @@ class Places(NamedTuple):
             cos = 1 / np.sqrt(1 + (1 / cos**2 - 1) / along2)
         tan2 = 1 / cos**2 - 1
         shortened = 1 / np.sqrt(1 + along2 * tan2)
-        at = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
+        rough = [(1 + 1 / ROUGHEST) * np.sqrt(a2) / (1 + np.sqrt(a2)) for a2 in (along2, across2)]
         rho2 = np.maximum(1 - (alpha_u * alpha_v) ** 2 / (along2 * across2), 0)
-        at = np.stack([np.sqrt(cos), *at], axis=-1)
+        at = np.stack([np.sqrt(cos), *rough], axis=-1)
         return cls(cos, phi, shortened, at, rho2, skewed(along2 / (alpha_u * alpha_v)))
 
     @classmethod
@@ -364,10 +364,10 @@ class Places(NamedTuple):
         return cls(*(np.concatenate(each) for each in zip(*places, strict=True)))
 
     def terms(self, name: str, bend: float = 1) -> np.ndarray:
-        x, factor = 1 - self.cos, 1 - self.cos
+        x, y, factor = 1 - self.cos, evened(self.y), 1 - self.cos
         if name == "lost":
-            x, factor = 2 * self.shortened / (self.shortened + bend * (1 - self.shortened)) - 1, np.ones(len(self.cos))
-        y = self.y if name == "lost" else evened(self.y)
+            x, y = 2 * self.shortened / (self.shortened + bend * (1 - self.shortened)) - 1, self.y
+            factor = np.ones(len(self.cos))
         powers = [(i, j) for j, count in enumerate(COUNTS[name]) for i in range(count)]
         return np.stack([x**i * y**j * factor ** min(j, 1) for i, j in powers], axis=-1)
 
