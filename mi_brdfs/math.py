@@ -49,6 +49,12 @@ def clamp(x: Any, low: float, high: float) -> Any:
     return _limited(x, low, high)
 
 
+def in_lanes(x: Any, lanes: Any) -> Any:
+    """Return x, and where its derivatives are sought, with as many lanes as the array ``lanes``: what is the same in
+    all of them sums its derivatives over them after each operation, in a kernel that computes all before it again."""
+    return x + dr.zeros(mi.Float, dr.width(lanes)) if dr.is_diff_v(x) and dr.grad_enabled(x) else x
+
+
 def _limited(x: Any, low: Any, high: Any) -> Any:
     return dr.minimum(dr.maximum(x, float(low)), float(high))
 

@@ -116,21 +116,8 @@ class Film(Fresnel):
         film, below = dr.sqrt(dr.maximum(n2 - 1 + cos * cos, EPSILON)), Complex(a, -b)
         eta, k = self.base.eta, self.base.k
         ratio = Complex(eta * eta - k * k, -2 * eta * k) * (film / n2)
-        waves = [] if thickness is None else list(self._waves(2 * film * thickness))
+        waves = None if thickness is None else Waves(2 * film * thickness)
         return Airy((cos, film), (Complex(film), below), waves), Airy((cos * n2, film), (ratio, below), waves)
-
-    @staticmethod
-    def _waves(path: Any) -> Iterator[tuple[Any, Complex]]:
-        """Yield weights and e, whose weighted sum is the mean of what is a power series in e, for path differences."""
-        if mi.is_spectral:
-            sin, cos = dr.sincos(dr.two_pi * path)
-            yield 1, Complex(cos, -sin)
-            return
-        for rate, colour in waves():
-            sin, cos = dr.sincos(rate.imag * path)
-            parts = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
-            weight = Complex(*(part if mi.is_rgb else mi.luminance(part) for part in parts))
-            yield weight, Complex(cos, sin) * dr.exp(rate.real * path)
 
 
 @dataclass
@@ -166,16 +153,54 @@ class Complex:
 ONE = Complex(1)
 
 
+class Waves:
+    """The waves of a path difference L in a film: weights, rates p and e = exp(p L), whose weighted sum is the mean of
+    what is a power series in e."""
+
+    def __init__(self, path: Any) -> None:
+        self.path = path
+        with dr.suspend_grad():
+            self.all = list(self._spectral(path) if mi.is_spectral else self._seen(path))
+
+    @staticmethod
+    def _spectral(path: Any) -> Iterator[tuple[Any, Complex, Complex]]:
+        sin, cos = dr.sincos(dr.two_pi * path)
+        yield 1, Complex(0, -dr.two_pi), Complex(cos, -sin)
+
+    @staticmethod
+    def _seen(path: Any) -> Iterator[tuple[Any, Complex, Complex]]:
+        for rate, colour in waves():
+            sin, cos = dr.sincos(rate.imag * path)
+            parts = (mi.Color3f(*part.tolist()) for part in (colour.real, colour.imag))
+            weight = Complex(*(part if mi.is_rgb else mi.luminance(part) for part in parts))
+            yield weight, Complex(rate.real, rate.imag), Complex(cos, sin) * dr.exp(rate.real * path)
+
+    def mean(self, c: Complex) -> Complex:
+        """Return the mean of h = e/(1 + c e).
+
+        Its derivatives are sums, too: ∂h/∂c = -h² and ∂h/∂L = p h (1 - c h). Traced through every wave, those of a few
+        lobes made a kernel that took LLVM an hour to compile.
+        """
+        with dr.suspend_grad():
+            every = [(weight, rate, e / (ONE + c * e)) for weight, rate, e in self.all]
+            mean = sum((h * weight for weight, _, h in every), Complex(0))
+        if not dr.grad_enabled(c, self.path):
+            return mean
+        with dr.suspend_grad():
+            by_c = sum((h * h * weight for weight, _, h in every), Complex(0))
+            by_path = sum((rate * h * (ONE - c * h) * weight for weight, rate, h in every), Complex(0))
+        return mean - by_c * (c - dr.detach(c)) + by_path * (self.path - dr.detach(self.path))
+
+
 class Airy:
     """The amplitude r = a + (1 - a²) b h that one polarization reflects, from the u and v of both faces, of which the
     upper one's are real, and a mean over waves."""
 
-    def __init__(self, upper: tuple[Any, Any], lower: tuple[Complex, Complex], waves: list[Any]) -> None:
+    def __init__(self, upper: tuple[Any, Any], lower: tuple[Complex, Complex], waves: Waves | None) -> None:
         upper_amplitude, self.through = _amplitude(*(Complex(it) for it in upper))
         self.a, (self.b, below) = upper_amplitude.real, _amplitude(*lower)
         self.ab = self.b * self.a
-        h = (e / (ONE + self.ab * e) * weight for weight, e in waves)
-        self.bh = self.b * sum(h, Complex(0))
+        self.bh = Complex(0) if waves is None else self.b * waves.mean(self.ab)
         self.kept = self.through * below / dr.maximum(self.through + below - self.through * below, EPSILON)
 
     def reflectance(self) -> Spectrum:

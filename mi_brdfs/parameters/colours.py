@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import mitsuba as mi
 
-from ..math import clamp
+from ..math import clamp, in_lanes
 from .messages import interval, number_or_none
 from .parameter import Parameter, ParameterRow, Quantity
 from .reader import PropertyReader, Range
@@ -37,7 +37,7 @@ class Colour(Parameter):
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> mi.UnpolarizedSpectrum | None:
         if not self.textures:
             return None
-        return clamp(evaluate_colour(self.textures, self.names[0], si, active), *self.limits)
+        return in_lanes(clamp(evaluate_colour(self.textures, self.names[0], si, active), *self.limits), si.wi)
 
     def placeholder(self) -> mi.UnpolarizedSpectrum | None:
         return mi.UnpolarizedSpectrum(self.default or 0) if self.textures else None

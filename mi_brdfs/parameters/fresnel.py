@@ -9,7 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..math import clamp
+from ..math import clamp, in_lanes
 from .colours import rgb_texture
 from .groups import OneTerm
 from .messages import listed, shown
@@ -112,7 +112,8 @@ class ConductorName(Parameter):
         return self.replace(textures=textures, ranges=dict(self.limits))
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[Any, ...] | None:
-        return tuple(clamp(it.eval(si, active), *self.ranges[name]) for name, it in self.textures.items()) or None
+        found = {name: it.eval(si, active) for name, it in self.textures.items()}
+        return tuple(in_lanes(clamp(it, *self.ranges[name]), si.wi) for name, it in found.items()) or None
 
     def rows(self) -> list[ParameterRow]:
         return [ParameterRow(self.name, "string", "none", "Mitsuba's conductors | none", self.text)]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..math import clamp
+from ..math import clamp, in_lanes
 from .colours import constant_texture
 from .messages import interval, number_or_none, shown
 from .parameter import Chosen, Parameter, ParameterRow, Quantity
@@ -116,7 +116,8 @@ class Number(Parameter):
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
         if not self.textures:
             return None
-        values = [clamp(texture.eval_1(si, active), *self.ranges[name]) for name, texture in self.textures.items()]
+        found = {name: texture.eval_1(si, active) for name, texture in self.textures.items()}
+        values = [in_lanes(clamp(value, *self.ranges[name]), si.wi) for name, value in found.items()]
         if self.scale != 1:
             values = [value * self.scale for value in values]
         return (values[0], values[-1]) if self.anisotropic else values[0]
@@ -195,7 +196,7 @@ class Rotation(Parameter):
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> tuple[mi.Float, mi.Float] | None:
         if not self.textures:
             return None
-        turns = self.textures[self.name].eval_1(si, active)
+        turns = in_lanes(self.textures[self.name].eval_1(si, active), si.wi)
         sin, cos = dr.sincos(dr.two_pi * (turns - dr.round(turns)))  # whole turns would take the digits
         return cos, sin
 
