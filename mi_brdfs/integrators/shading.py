@@ -196,28 +196,26 @@ class Shading(Plugin):
         if mi.has_flag(light.flags(), flags.DeltaPosition) or mi.has_flag(light.flags(), flags.DeltaDirection):
             return mi.Point2f(0.5)
         if self.area_lights == "centre" and not light.is_environment():
-            shape = light.get_shape().class_name()
-            if shape not in CENTRES:
-                raise ParameterError(
-                    f'shading: area_lights = "centre" knows {listed(list(CENTRES), "and")}, but a light is a {shape}; '
-                    'replace it, or use area_lights = "sample".'
-                )
-            if mi.has_flag(light.flags(), flags.SpatiallyVarying):
-                raise ParameterError(
-                    'shading: area_lights = "centre" knows lights of one radiance, but that of a light is a texture; '
-                    'use area_lights = "sample".'
-                )
-            if shape == "Sphere" and light.get_shape().has_flipped_normals():
-                raise ParameterError(
-                    'shading: area_lights = "centre" knows spheres that shine outward, but a light is one that shines '
-                    'inward, from all around; use area_lights = "sample".'
-                )
-            return mi.Point2f(*CENTRES[shape])
+            return centre(light)
         return sampler.next_2d()
 
 
 CENTRES = {"Rectangle": (0.5, 0.5), "Disk": (0.5, 0.5), "Sphere": (0, 0)}
 """The sample that yields the centre of a shape; a sphere samples the cone that it subtends."""
+
+
+def centre(light: mi.Emitter) -> mi.Point2f:
+    """Return the sample that yields the centre of an area light."""
+    kind, inward = light.get_shape().class_name(), light.get_shape().has_flipped_normals()
+    for refused, known in (
+        (kind not in CENTRES, f"{listed(list(CENTRES), 'and')}, but a light is a {kind}"),
+        (mi.has_flag(light.flags(), mi.EmitterFlags.SpatiallyVarying),
+         "lights of one radiance, but that of a light is a texture"),
+        (kind == "Sphere" and inward, "spheres that shine outward, but a light is one that shines inward"),
+    ):  # fmt: skip
+        if refused:
+            raise ParameterError(f'shading: area_lights = "centre" knows {known}; use area_lights = "sample".')
+    return mi.Point2f(*CENTRES[kind])
 
 
 def mean_cosine(light: mi.Emitter, ds: mi.DirectionSample3f) -> mi.Float:

@@ -13,8 +13,11 @@ from typing import Any, Literal, NamedTuple, get_args
 import mitsuba as mi
 import numpy as np
 
+from . import scenery  # noqa: F401, which fills RULES, as surfaces does
 from .document import Element, Reader, plugin, prop, rgb_of, root_of, written
-from .rules import RULES, colours, modernize
+from .older import modernize
+from .rules import RULES
+from .surfaces import colours
 from .tables import PLUGINS
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
