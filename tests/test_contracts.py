@@ -12,6 +12,7 @@ from mi_brdfs.microfacet.fresnel import Unit
 from mi_brdfs.microfacet.shadowing import VCavity
 from mi_brdfs.mitsuba.errors import one_line
 from mi_brdfs.parameters import Choice, Flag, Number, OneOf, PerLobe, Reflectance, Rotation, Spelling
+from mi_brdfs.validation import check
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb", "as_before")
 
@@ -215,3 +216,32 @@ def test_a_lobe_that_changes_only_what_another_one_evaluates(below):
     value, pdf = call(bsdf.eval_pdf, mi.BSDFContext(), wi, wo)
     np.testing.assert_allclose(density, pdf, rtol=1e-3)
     np.testing.assert_allclose(weight * pdf, value, rtol=1e-3)
+
+
+def test_an_error_of_the_author_has_its_line():
+    """Where it is raised: as the BSDF is made, or as it is evaluated, also in what the checker says. Not a sentence of
+    the author's."""
+
+    def undefined(self, p):
+        return (nothing(p),)  # noqa: F821
+
+    def refusing(self, p):
+        raise ValueError("slip: it needs a name")
+
+    class Misspelt(LambertLobe):
+        def eval_pdf(self, wi, wo):
+            return self.colour * wo.zz, wo.z
+
+    at = undefined.__code__.co_firstlineno + 1
+    model(undefined, reflectance=Reflectance(0.5, "albedo"))
+    assert told() == f"test_contracts.py, line {at}: NameError: name 'nothing' is not defined"
+    model(refusing)
+    assert told() == "slip: it needs a name"
+
+    at = Misspelt.eval_pdf.__code__.co_firstlineno + 1
+    model(lambda self, p: (Misspelt(p.reflectance),), reflectance=Reflectance(0.5, "albedo"))
+    with pytest.raises(Exception) as caught:
+        radiance()
+    assert one_line(caught.value).startswith(f"test_contracts.py, line {at}: ")
+    (finding,) = check({"type": "slip"}, only=["finite"]).of("finite")
+    assert finding.message.endswith(f"(test_contracts.py, line {at}).")

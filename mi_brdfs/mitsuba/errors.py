@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import re
+import sysconfig
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from ..parameters.messages import brief, printable
 from ..parameters.vocabulary import plugin_hint
 from ..starting import Terminated
 from .registry import plugin_names
+
+OURS = str(Path(__file__).parents[1])
+ERROR = r"^[\w.]+(?:Error|Exception|Warning): "
+"""How Python begins what an exception says."""
+LIBRARIES = OURS, *(sysconfig.get_path(name) for name in ("purelib", "platlib", "stdlib"))
 
 
 @contextmanager
@@ -43,7 +51,27 @@ def one_line(error: BaseException) -> str:
     if unused:
         return f"-D {', '.join(unused)}: the scene has no <default> parameter of this name"
     sentence = _hint(text) or _unknown_type(text) or _last_of_traceback(rest if place else text)
+    if line := line_of_author(error):
+        sentence = f"{line}: {_kind(error)}: {sentence}"
     return f"{place[1]}: line {place[2]}: {sentence}" if place else sentence
+
+
+def line_of_author(error: BaseException) -> str:
+    """Return where the code of a model, a lobe or a term that is not ours raised an exception, as ``FILE.py, line 3``;
+    nothing if none did, or if it is a ValueError, whose sentence its author wrote for others."""
+    if _kind(error) in ("ValueError", "ParameterError"):
+        return ""
+    traced = re.findall(r'^  File "(.+)", line (\d+), in ', str(error), re.MULTILINE)
+    traced = traced or [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+    called = [k for k, (file, _) in enumerate(traced) if file.startswith(OURS)]
+    own = [(file, line) for file, line in traced[min(called, default=len(traced)) :] if not file.startswith(LIBRARIES)]
+    return f"{Path(own[-1][0]).name}, line {own[-1][1]}" if own else ""
+
+
+def _kind(error: BaseException) -> str:
+    """Return the name of an exception's type, or of the one whose traceback is its text."""
+    raised = re.findall(ERROR, str(error), re.MULTILINE) if "Traceback (most" in str(error) else []
+    return raised[-1].rpartition(".")[2].rstrip(": ") if raised else type(error).__name__
 
 
 def _hint(text: str) -> str | None:
@@ -64,8 +92,8 @@ def _unknown_type(text: str) -> str | None:
 
 def _last_of_traceback(text: str) -> str:
     """Return the exception's message if ``text`` holds a Python traceback, else ``text``, in one line."""
-    _, traceback, tail = text.partition("Traceback (most recent call last):")
-    if traceback:
-        text = re.split(r"^[\w.]+(?:Error|Exception|Warning): ", tail, flags=re.MULTILINE)[-1]
+    _, found, tail = text.partition("Traceback (most recent call last):")
+    if found:
+        text = re.split(ERROR, tail, flags=re.MULTILINE)[-1]
     # Text from a scene file must not control the terminal.
     return printable(" ".join(text.split()))

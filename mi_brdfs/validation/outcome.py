@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..mitsuba.errors import unwrapped_ctrl_c
+from ..mitsuba.errors import line_of_author, unwrapped_ctrl_c
 from ..parameters.messages import brief
 from ..probe.arrays import Array
 from ..probe.directions import angles_of
@@ -175,7 +175,8 @@ def told(error: Exception) -> str:
     line = next((line.strip() for line in str(cause).splitlines() if line.strip()), "")
     if unknown := re.search(r'Plugin "(.+)" not found', line):
         return f'nobody has registered the plugin "{brief(unknown[1])}" there'
-    return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "")
+    at = f" ({place})" if (place := line_of_author(cause)) else ""
+    return type(cause).__name__ + (f": {brief(line.rstrip('.'))}" if line else "") + at
 
 
 def relative(got: Array, expected: Array, floor: float = 1e-7, unknown: float = np.inf) -> Array:
