@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..parameters.messages import brief, no_file
 from .app import command, imported
 from .options import (
     PAGES,
@@ -77,7 +78,7 @@ def explore(
     room = Path(f"{file}.xml" if material else file) if scene else None
     for option, path in (("scene", room), ("environment", environment), ("mesh", mesh)):
         if path and not path.is_file():
-            fail(f"--{option} {path}: no such file", Exit.USAGE)
+            fail(f"--{option} {no_file(path)}", Exit.USAGE)
     if vary and not export:
         fail("--vary is for pages of --export; in the live page move the sliders", Exit.USAGE)
     varied = _varied(vary or [])
@@ -87,7 +88,6 @@ def explore(
     from ..explorer.stages import MESHES, UserScene
     from ..measured import read
     from ..measured.report.counts import in_one_plane
-    from ..parameters.messages import brief
     from ..probe.sources import is_measured
 
     user = UserScene(room, material or None)

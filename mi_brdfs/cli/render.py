@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import mitsuba as mi
 import typer
 
-from ..parameters.messages import listed
+from ..parameters.messages import listed, no_file
 from ..rendering.scene_file import RESERVED, SceneFile
 from .app import command
 from .options import (
@@ -131,7 +131,7 @@ def _index(scene: mi.Scene, sensor: str) -> int:
 def _load(file: SceneFile) -> mi.Scene:
     path = Path(file.path)
     if not path.is_file():
-        fail(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+        fail(no_file(path))
     with failing(Exit.ERROR, Exception):
         scene = file.load()
     if not isinstance(scene, mi.Scene):

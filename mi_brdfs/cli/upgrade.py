@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from ..parameters.messages import no_file
 from .app import command
 from .options import Lenient, file_option, parameters_of, parameters_option, write_text
 from .terminal import Exit, err, fail, failing, out
@@ -27,7 +28,7 @@ def upgrade(
     from ..legacy import is_new, upgrade  # imports numpy
 
     if not old.is_file():
-        fail(f"{old}: no such file", Exit.USAGE)
+        fail(no_file(old), Exit.USAGE)
     if is_new(old):
         if define:
             fail(f"-D {define[0]}: {old} is a scene of Mitsuba 3, which stays as it is", Exit.USAGE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -48,6 +49,11 @@ def brief(text: str) -> str:
 def printable(text: str) -> str:
     """Return a text on one line, without characters that control a terminal or that XML may not have."""
     return "".join(character if character.isprintable() else "�" for character in text)
+
+
+def no_file(path: Path) -> str:
+    """Return what to say of a path that is no file."""
+    return f"{path}: {'not a file' if path.exists() else 'no such file'}"
 
 
 def listed(words: Iterable[str], last: str = "or", quote: bool = False) -> str:

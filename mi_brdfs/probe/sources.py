@@ -17,6 +17,7 @@ import numpy as np
 from .. import loading
 from ..names import check_name, tabulated
 from ..parameters import published
+from ..parameters.messages import no_file
 from ..srgb import decoded
 from .bsdf import BSDFProbe, contained, load, shapes_of
 from .directions import direction, on_side
@@ -92,7 +93,7 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
     path, wanted = _parted(word)
     is_text = word.startswith("<") and not (is_data or path)
     if path and not path.is_file():
-        raise ValueError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+        raise ValueError(no_file(path))
     name = Path(word).name if is_data else path.name if path else word
     source = BSDFSource(name, word, str(path or word), None, parameters)
     if path and path.suffix == ".json":
