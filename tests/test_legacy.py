@@ -449,6 +449,25 @@ def test_materials_of_an_obj_are_named(folder, upgraded, bsdfs, said):
     assert said in new.report() and new.xml.count('type="diffuse"') == min(len(bsdfs), 1)
 
 
+@pytest.mark.parametrize("kind, value, linear", [("uchar", 255, True), ("uchar", 51, False), ("float", 0.2, True)])
+def test_colours_of_vertices(load, folder, kind, value, linear):
+    """Bytes are parts of 255; colours in sRGB are not decoded, and the report says so."""
+    header = ["ply", "format ascii 1.0", "element vertex 3", *(f"property float {axis}" for axis in "xyz")]
+    header += [*(f"property {kind} {name}" for name in ("red", "green", "blue")), "element face 1"]
+    header += ["property list uchar int vertex_indices", "end_header"]
+    vertices = [f"{at} {value} {value} {value}" for at in ("-1 -1 0", "1 -1 0", "0 1 0")]
+    (folder / "painted.ply").write_text("\n".join([*header, *vertices, "3 0 1 2", ""]))
+    srgb = '<boolean name="srgb" value="false"/>' * linear
+    scene, warning = load(
+        f'<shape type="ply"><string name="filename" value="painted.ply"/>{srgb}<bsdf type="twosided">'
+        '<bsdf type="diffuse"><texture name="reflectance" type="vertexcolors"/></bsdf></bsdf></shape>'
+    )
+    si = scene.ray_intersect(mi.Ray3f([0, 0, 2], [0, 0, -1]))
+    reflectance = numbers(si.bsdf().eval(mi.BSDFContext(), si, mi.Vector3f(0, 0, 1))).ravel() * np.pi
+    np.testing.assert_allclose(reflectance, value / (255 if kind == "uchar" else 1), 1e-5)
+    assert f"{1 if linear else 2} approximated" in warning
+
+
 def test_files_are_found_from_where_a_link_leads(folder, upgraded, tmp_path):
     (tmp_path / "deep").mkdir()
     (folder / "link").symlink_to(tmp_path / "deep", target_is_directory=True)

@@ -60,6 +60,8 @@ def _from_3(element: Element, say: Callable[[Element, str], None]) -> None:
         if element.type == "perspective":
             element.set("fov_axis", "larger" if smaller and smaller.value == "false" else "smaller")
         element.to_world().children.insert(0, Element("scale", {"x": "-1"}))
+    if element.tag == "blackbody" and "multiplier" in element.attributes:
+        element.attributes["scale"] = element.attributes.pop("multiplier")
     if element.tag == "film" and (alpha := element.pop("alpha")):
         element.set("pixel_format", "rgba" if alpha.value == "true" else "rgb")
     if old != (element.tag, element.type):

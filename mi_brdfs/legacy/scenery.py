@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SMALLEST_SUN = 0.05
 """What Mitsuba 3 draws of a sun without width, in degrees."""
 HEAD = 1 << 16
-"""The bytes of an OBJ file in which its library of materials is named."""
+"""The bytes of a mesh in which an OBJ's library of materials is named, and a PLY says what is in it."""
 
 
 @rule("emitter", "sun", "sky", "sunsky")
@@ -99,6 +99,21 @@ def _obj(work: Work, element: Element) -> None:
         with (work.folder / name.value).open("rb") as file:
             if re.search(rb"^\s*mtllib\s", file.read(HEAD), re.MULTILINE):
                 work.dropped(element, f"the materials of {name.value}; split it by usemtl, and give each part a BSDF")
+
+
+@rule("shape", "ply")
+def _ply(work: Work, element: Element) -> None:
+    encoded, name = not (srgb := element.pop("srgb")) or srgb.value == "true", element["filename"]
+    attributes = [it for it in work.reached(element) if it.type == "mesh_attribute"]
+    if not attributes or name is None:
+        return
+    with (work.folder / name.value).open("rb") as file:
+        bytes_ = re.search(rb"^property\s+(uchar|uint8)\s+(red|r)\s*$", file.read(HEAD), re.MULTILINE)
+    if bytes_:  # which 0.6 divides by the largest
+        for it in attributes:
+            it.set("scale", 1 / 255)
+    if encoded:
+        work.approximated(element, f"the colours in {name.value} are read as linear, which 0.6 decodes from sRGB")
 
 
 @rule("shape", "instance")

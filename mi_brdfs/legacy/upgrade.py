@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partialmethod
 from pathlib import Path
@@ -133,6 +134,12 @@ class Work:
     def resolved(self, element: Element) -> Element:
         """Return what a reference refers to, or the element itself."""
         return (element.tag == "ref" and self.ids.get(element.id)) or element
+
+    def reached(self, element: Element) -> Iterator[Element]:
+        """Yield all that is in an element, also by reference."""
+        for it in element.children:
+            yield (target := self.resolved(it))
+            yield from self.reached(target)
 
     def scene(self, root: Element, minor: int) -> Element:
         modernize(root, minor, self.changed)
