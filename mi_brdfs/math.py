@@ -76,7 +76,7 @@ class _Clamp(dr.CustomOp):
         return "clamp"
 
 
-def leaving(limit: float, inside: Any, function: Callable[..., Any], *parameters: Any) -> Any:
+def leaving(limit: Any, inside: Any, function: Callable[..., Any], *parameters: Any) -> Any:
     """Return a function of parameters of at least ``limit``, where its derivatives for them vanish. They are replaced
     there by those at ``inside``: otherwise an optimisation that comes to the limit,
     or goes beyond, would stay there."""

@@ -372,6 +372,35 @@ def outwards(texture, si, active):
     return dr.replace_grad(dr.clip(value, 0, 1), value)
 
 
+def with_derivative(of):
+    """A Lambertian whose reflectance has the derivative of what a function makes of it, its texture and the point."""
+
+    def evaluate(texture, si, active):
+        value = texture.eval(si, active)
+        return dr.replace_grad(dr.detach(value), of(value, texture, si))
+
+    return colour(evaluate)
+
+
+class Backward(dr.CustomOp):
+    """What is given, with another derivative backward than forward."""
+
+    def eval(self, value, backward):
+        self.given = backward
+        return value * 1
+
+    def forward(self):
+        self.set_grad_out(self.grad_in("value"))
+
+    def backward(self):
+        self.set_grad_in("value", self.given(self.grad_out()))
+
+
+def backward(change):
+    """A Lambertian with another derivative backward than forward."""
+    return colour(lambda texture, si, active: dr.custom(Backward, texture.eval(si, active), change))
+
+
 # --- Adapters -------------------------------------------------------------------------------------------------------
 
 
@@ -940,6 +969,25 @@ MUTANTS = [
         "gradients",
         Lambert,
         evaluated(density=lambda ctx, si, wo: 1 + 1e-6 * root_at_normal(si.wi)),
+    ),
+    mutant(
+        "derivatives of exchanged channels",
+        "gradients",
+        with_derivative(lambda value, *_: mi.Color3f(value.z, value.y, value.x)),
+        reflectance=RED,
+    ),
+    mutant(
+        "derivative of the mean in all channels",
+        "gradients",
+        with_derivative(lambda value, *_: mi.Color3f(dr.mean(value))),
+        reflectance=RED,
+    ),
+    mutant("derivative of the wrong sign backward", "gradients", backward(lambda grad: -grad)),
+    mutant(
+        "derivatives of exchanged channels backward",
+        "gradients",
+        backward(lambda grad: mi.Color3f(grad.z, grad.y, grad.x)),
+        reflectance=RED,
     ),
     mutant("weight detached", "gradients", Lambert, sampled(weight=lambda bs, w, si, u: dr.detach(w))),
     mutant("weight with half of its derivative", "gradients", Phong, sampled(weight=half_attached)),

@@ -28,6 +28,7 @@ from mutants import (
     mirrored,
     of_others,
     stranger,
+    with_derivative,
     without_fields,
     wrapped,
 )
@@ -72,6 +73,23 @@ def test_mutants_are_caught(mutant):
         if finding.check in ("weight", "chi2", "reciprocity", "horizon"):
             assert len(finding.at["wi"]) == 3, finding
             assert ("seed" in finding.at) == (finding.check in ("weight", "chi2")) or finding.check == "horizon"
+
+
+def test_the_derivative_is_that_of_its_texel():
+    """A Lambertian with the derivative at another one, whose texels have what the right ones have in sum."""
+
+    def elsewhere(value, texture, si):
+        other = mi.SurfaceInteraction3f(si)
+        other.uv = mi.Point2f(si.uv.y, si.uv.x)
+        return texture.eval(other)
+
+    texels = mi.Bitmap(np.random.default_rng(1).uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32))
+    reflectance = {"type": "bitmap", "bitmap": texels, "raw": True}
+    for of, is_wrong in ((elsewhere, True), (lambda value, texture, si: value, False)):
+        given = Mutant("another texel", ("gradients",), with_derivative(of)).register()
+        report = check(given | {"reflectance": reflectance}, only=["gradients"])
+        (found,) = (it for it in report.of("gradients") if it.subject == "reflectance.data")
+        assert any("its derivatives are off" in it for it in found.data["faults"]) == is_wrong, found
 
 
 def turned(matrix, light, viewer):

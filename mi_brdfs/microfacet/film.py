@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import EPSILON, SMALL, Spectrum, leaving, luminance, safe_sqrt
+from ..math import EPSILON, SMALL, Spectrum, clamp, leaving, luminance, safe_sqrt
 from ..observer import observer
 from ..parameters import Number, ParameterError
 from ..parameters.parameter import Quantity
@@ -74,13 +74,13 @@ class Film(Fresnel):
     """
 
     def __init__(self, base: Interface, index: Any, thickness: Any) -> None:
-        self.base, self.index = base, dr.select(index < base.exterior, 1, index / base.exterior)
+        self.base, self.index = base, clamp(index / base.exterior, 1, dr.inf)
         self.thickness = thickness * base.exterior
 
     def __call__(self, cos: mi.Float) -> Spectrum:
-        # Over dielectrics derivatives vanish at 0: take those at 30 nm, or of light of 600 nm.
-        inside = 0.05 if mi.is_spectral else 30
-        return leaving(0, inside, lambda it: self._unpolarized(*self._polarized(cos, it)), self.thickness)
+        # Over what absorbs nothing derivatives vanish at 0: take those at 30 nm, or of light of 600 nm.
+        limit, inside = dr.select(dr.max(self.base.k) > 0, -1, 0), 0.05 if mi.is_spectral else 30
+        return leaving(limit, inside, lambda it: self._unpolarized(*self._polarized(cos, it)), self.thickness)
 
     def estimate(self, cos: mi.Float) -> Spectrum:
         # Interference may leave nothing at one angle.

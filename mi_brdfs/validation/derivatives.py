@@ -31,6 +31,19 @@ TURN = 0.01
 """The step by which directions are turned, in parts of the width of a lobe."""
 
 
+class Derivatives(NamedTuple):
+    """The derivatives of values for a parameter, of which each entry grows as :func:`_direction` says."""
+
+    of_each: Array
+    """Those of each value, by forward differentiation."""
+    total: float
+    """Their sum with some weights."""
+    size: float
+    """That of their absolute values."""
+    reverse: Array
+    """Those of the sum of the values, with these weights, for each entry, by reverse differentiation."""
+
+
 class Pairs(NamedTuple):
     """Pairs of directions."""
 
@@ -46,8 +59,9 @@ class Pairs(NamedTuple):
 
 
 def gradients(run: Run) -> Findings:
-    """Check that the derivatives of ``eval`` for each parameter are finite, also at grazing and normal incidence, and
-    equal to finite differences: to 2 % on average, besides the error of these, over directions as they are drawn. At a
+    """Check that the derivatives of ``eval`` for each parameter are finite, also at grazing and normal incidence, the
+    same by forward and by reverse differentiation, and equal to finite differences as its entries grow, one channel or
+    texel faster than another: to 2 % on average, besides the error of these, over directions as they are drawn. At a
     kink, the derivatives of both sides will do, and what lies between; where the differences of two steps disagree, as
     at a jump, they prove nothing and do not count, and where that is so of most, a value beside the one given is looked
     at.
@@ -109,42 +123,71 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
 
 
 def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs: Pairs) -> Array:
-    """Check that derivatives are finite, and return those for pairs as they are drawn."""
-    derivatives, total = _derivatives(run, parameter, pairs.wi, pairs.wo)
-    at_edges, total_at_edges = _derivatives(run, parameter, *_edges(run.probe.whole))
+    """Check that derivatives are finite and the reverse ones those of forward differentiation, and return these for
+    pairs as they are drawn."""
+    found, at_edges = (_derivatives(run, parameter, it) for it in (pairs, _edges(run.probe.whole)))
+    where = " at grazing or normal incidence"
     for name, values in (
-        ("of its derivatives", derivatives),
-        ("of its derivatives at grazing or normal incidence", at_edges),
-        ("of its derivatives by dr.backward", total),
-        ("of its derivatives by dr.backward at grazing or normal incidence", total_at_edges),
+        ("of its derivatives", found.of_each),
+        (f"of its derivatives{where}", at_edges.of_each),
+        ("of its derivatives by dr.backward", found.reverse),
+        (f"of its derivatives by dr.backward{where}", at_edges.reverse),
     ):
         if not np.isfinite(values).all():
             outcome.fault(f"{1 - np.isfinite(values).mean():.1%} {name} are not finite", np.inf)
-    return derivatives
+    reverse = float(np.sum(found.reverse * _direction(parameter)))
+    if abs(reverse - found.total) > TOLERANCE * found.size:
+        words = f"of a weighted sum of values is {reverse:.4g} by dr.backward, but {found.total:.4g} by dr.forward"
+        outcome.fault(f"the derivative {words}", abs(reverse - found.total) / found.size)
+    return found.of_each
 
 
-def _derivatives(run: Run, parameter: Parameter, wi: Array, wo: Array) -> tuple[Array, Array]:
-    """Return ``(derivatives, total)`` for a parameter: of each value as all entries of the parameter grow alike, by
-    forward differentiation, and of the sum of the values by reverse differentiation, in which other things go wrong."""
-    if dr.grad_enabled(result := _attached(run, parameter, wi, wo)):
-        dr.forward(parameter.params[parameter.key])
-    derivatives = numbers(dr.grad(result), len(wo)).copy()
-    if dr.grad_enabled(result := _attached(run, parameter, wi, wo)):
-        dr.backward(dr.sum(result, axis=None))
-    return derivatives, parameter.gradient
+def _direction(parameter: Parameter) -> Array:
+    """Return by how much each entry of a parameter grows: one channel or texel not as another."""
+    entries = np.size(np.array(parameter.value))
+    # With this seed the first three, those of a colour, are far from one another.
+    return np.ones(1) if entries == 1 else np.random.default_rng(64).uniform(0.5, 1.5, entries)
 
 
-def _attached(run: Run, parameter: Parameter, wi: Array, wo: Array) -> Any:
+def _along(parameter: Parameter, by: float = 1) -> Any:
+    """Return that, times a number, as a value of the parameter."""
+    value = parameter.value
+    return type(value)(np.float32(by * _direction(parameter)).reshape(np.shape(np.array(value))))
+
+
+def _derivatives(run: Run, parameter: Parameter, pairs: Pairs) -> Derivatives:
+    """Return the derivatives for a parameter, in both ways, in which other things go wrong."""
+    count, channels = len(pairs.wi), dr.size_v(mi.UnpolarizedSpectrum)
+    # In the sum no pair counts as much as another, nor does a channel.
+    weights = pairs.scale * np.random.default_rng(20).uniform(0.5, 1.5, (count, 1)) * np.geomspace(1, 4, channels)
+    if dr.grad_enabled(result := _attached(run, parameter, pairs)):
+        _forward(parameter)
+    of_each = numbers(dr.grad(result), count).copy()
+    if dr.grad_enabled(result := _attached(run, parameter, pairs)):
+        weighted = mi.unpolarized_spectrum(result) * mi.UnpolarizedSpectrum(np.float32(weights.T))
+        dr.backward(dr.sum(weighted, axis=None))
+    return Derivatives(of_each, np.sum(weights * of_each), np.sum(weights * abs(of_each)), parameter.gradient)
+
+
+def _attached(run: Run, parameter: Parameter, pairs: Pairs) -> Any:
     """Return values that derivatives for a parameter can be taken of."""
     parameter.attach()
-    return run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), True)
+    return run.probe.bsdf.eval(run.probe.whole.context, interaction(pairs.wi), vectors(pairs.wo), True)
 
 
-def _edges(part: Part) -> tuple[Array, Array]:
+def _forward(parameter: Parameter) -> None:
+    """Differentiate all that was computed of an attached parameter."""
+    value = parameter.params[parameter.key]
+    dr.set_grad(value, _along(parameter))
+    dr.enqueue(dr.ADMode.Forward, value)
+    dr.traverse(dr.ADMode.Forward)
+
+
+def _edges(part: Part) -> Pairs:
     """Return pairs of directions where formulas break: normal, grazing, mirrored, equal."""
     edge = np.array([direction(t, phi) for t in (0, 1e-3, 45, 89, 89.9, 89.99) for phi in (0, 50, 180)])
     edge = on_side(edge, part.sides[0])
-    return np.repeat(edge, len(edge), axis=0), np.tile(edge, (len(edge), 1))
+    return Pairs(np.repeat(edge, len(edge), axis=0), np.tile(edge, (len(edge), 1)), np.ones((len(edge) ** 2, 1)))
 
 
 # --- Beside finite differences --------------------------------------------------------------------------------------
@@ -172,10 +215,10 @@ def _attempts(
         parameter.set(original + shift)
         if shift:
             # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
-            derivatives, _ = _derivatives(run, parameter, pairs.wi, pairs.wo)
+            derivatives = _derivatives(run, parameter, pairs).of_each
 
         def at(by: float, shift: float = shift) -> Array:
-            parameter.set(original + shift + by)
+            parameter.set(original + shift + _along(parameter, by))
             return run.probe.eval(run.probe.whole, pairs.wi, pairs.wo)
 
         # Plugins other than ours may clip: look beside such ends.
@@ -226,7 +269,7 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
     # Only ends of the graph keep a derivative, and the weight may depend on the direction.
     results = bs.wo * 2, weight, value / density, value / dr.detach(density)
     if dr.grad_enabled(results):
-        dr.forward(parameter.params[parameter.key])
+        _forward(parameter)
     moved, of_weight, attached, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
     if not np.isfinite(of_weight).all():
         lost = 1 - np.isfinite(of_weight).mean()
@@ -264,7 +307,7 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
     def backward(value: float, signs: tuple[int, ...] = (1,)) -> tuple[Array, list[Array]]:
         """Return the values there, and the derivatives of their sum with some signs."""
         parameter.set(zero + value)
-        result, found = _attached(run, parameter, pairs.wi, pairs.wo), []
+        result, found = _attached(run, parameter, pairs), []
         for sign in signs:
             if dr.grad_enabled(result):
                 dr.set_grad(parameter.params[parameter.key], 0)
@@ -301,7 +344,7 @@ def _directional(run: Run, pairs: Pairs | None) -> Finding:
     """Check the derivatives of ``eval`` and ``pdf`` for the directions: they are finite, also where formulas break, and
     those of ``eval`` are those of finite differences for some ``pairs``, if there are any."""
     outcome, probe, part = Outcome("gradients", "wi and wo"), run.probe, run.probe.whole
-    wi, wo = _edges(part)
+    wi, wo, _ = _edges(part)
     some, others = (on_side(hemisphere(500, seed), part.sides[0]) for seed in (15, 16))
     mirrored = wi * np.array([-1, -1, 1], np.float32)
     wi, wo = np.concatenate([wi, wi, some, some]), np.concatenate([wo, mirrored, some, others])
