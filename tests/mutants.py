@@ -989,6 +989,11 @@ MUTANTS = [
         backward(lambda grad: mi.Color3f(grad.z, grad.y, grad.x)),
         reflectance=RED,
     ),
+    mutant(
+        "derivative for directions of the wrong sign backward",
+        "gradients",
+        diffuse(lambda wi, wo: 0.4 + 0.6 * dr.custom(Backward, wi.z * wo.z, lambda grad: -grad)),
+    ),
     mutant("weight detached", "gradients", Lambert, sampled(weight=lambda bs, w, si, u: dr.detach(w))),
     mutant("weight with half of its derivative", "gradients", Phong, sampled(weight=half_attached)),
     mutant("inactive lanes evaluated", "active", Ward, masked("eval_pdf")),

@@ -43,6 +43,9 @@ def _from_2(element: Element) -> None:
             inner.name = "value"
             scaled = plugin("texture", "scale", inner, scale=amount)
             element.put(replace(scaled, name=name, place=element.place))
+    if element.type == "cylinder" and element["p2"]:
+        for child in element.children:
+            child.name = {"p1": "p0", "p2": "p1"}.get(child.name, child.name)
     for name, value in DEFAULTS.get(element.type, []):
         if not element[name]:
             element.set(name, value)

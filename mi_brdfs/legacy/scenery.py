@@ -149,6 +149,15 @@ def _homogeneous(work: Work, element: Element) -> None:
     work.changed(element, "the coefficients of a medium are sigma_t and albedo; those not given are of skin1")
 
 
+@rule("medium", "heterogeneous")
+def _heterogeneous(work: Work, element: Element) -> None:
+    density = element["sigma_t"] and work.resolved(element["sigma_t"])
+    if density and density.type == "constvolume":
+        element.type = "homogeneous"
+        element.set("sigma_t", density.number("value", 1))
+        work.changed(element, "a heterogeneous medium of one density is homogeneous; the other is in a unit cube alone")
+
+
 def _coefficient(element: Element, name: str, default: Any) -> Any:
     """Take a coefficient of a medium out, for each channel."""
     found = element.pop(name)

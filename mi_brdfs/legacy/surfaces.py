@@ -91,6 +91,12 @@ def _conductor(work: Work, element: Element) -> Element:
         work.changed(element, f"eta and k of {element.type} are divided by extEta")
     elif exterior and not np.isclose(_index(exterior), 1, atol=1e-3):
         work.dropped(element, "extEta beside the spectra of a metal, which are not divided by it: they are as in air")
+    for it in (it for it in element.of("rgb") if it.name in ("eta", "k")):
+        if len(it.numbers()) == 1:
+            it.tag = "float"
+        elif max(it.numbers()) > 1:
+            told = "a colour, of which spectral variants clip what is above 1"
+            work.approximated(element, f"{it.name} of {element.type} is {told}")
     if not element["material"] and not element["eta"]:
         element.set("material", "Cu")
         work.changed(element, f"{element.type} without a material is copper, as in 0.6")

@@ -147,6 +147,7 @@ class Work:
         self.has_media = any(it.tag == "medium" for it in root.walk())
         scene = Element("scene", {"version": "3.0.0"}, self._parts(root))
         scene.children += self.lifted
+        self._unite_sun_and_sky(scene)
         if self.missing:
             first = self.missing[0] + f", and {len(self.missing) - 1} more" * (len(self.missing) > 1)
             raise ValueError(f"{first}; put the files there, or let stand-ins take their place (--lenient).")
@@ -156,6 +157,21 @@ class Work:
             scene.children.sort(key=lambda it: it is not sensors[-1])
             self.changed(root, "of several sensors the last, which 0.6 uses, is the first")
         return scene
+
+    def _unite_sun_and_sky(self, scene: Element) -> None:
+        """Put a sun of radius 0, which is no environment in 0.6, into the sky, or leave it out beside another one."""
+        around = [it for it in scene.of("emitter") if it.type in ("constant", "envmap", "sunsky")]
+        suns = [it for it in around if it["sky_scale"] and it.number("sky_scale", 1) == 0]
+        others = [it for it in around if it not in suns]
+        for sun in suns if others else []:
+            if others[0].type == "sunsky":
+                for name in ("sun_scale", "sun_aperture"):
+                    others[0].pop(name)
+                    others[0].children += [it for it in sun.children if it.name == name]
+                self.approximated(sun, "the sun of radius 0 is in the sky, and where that has it")
+            else:
+                self.dropped(sun, f"the sun of radius 0, beside {others[0].type}: Mitsuba 3 takes one environment")
+            scene.children.remove(sun)
 
     def _leave_out(self, parent: Element, children: list[Element], why: str) -> None:
         parent.children = [it for it in parent.children if it not in children]

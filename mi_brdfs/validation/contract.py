@@ -21,7 +21,7 @@ from . import sampling
 from .deltas import deltas
 from .outcome import KNOWN, Outcome, Skipped, skipping, told
 from .run import Run, of_each, of_whole
-from .traced import traced_floats
+from .traced import gradient, traced_floats
 
 COUNT = 2000
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
@@ -94,13 +94,12 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
 
     def gradients(wi: Array, wo: Array, mask: bool | mi.Bool, counted: bool | Array) -> tuple[list[Array], float]:
         """Return the derivatives of the sum of the values in the lanes that are counted, and the sum."""
-        for each in parameters:
-            each.attach()
+        attached = [each.attach() for each in parameters]
         value = run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), mask)
         value = dr.select(mi.Bool(counted), value, 0)
         if dr.grad_enabled(value):
             dr.backward(dr.sum(value, axis=None))
-        return [each.gradient for each in parameters], float(np.sum(np.array(dr.detach(value), np.float64)))
+        return [gradient(each) for each in attached], float(np.sum(np.array(dr.detach(value), np.float64)))
 
     with ExitStack() as stack:
         for each in parameters:

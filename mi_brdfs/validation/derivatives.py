@@ -19,7 +19,7 @@ from .differences import ROUNDING, Differences, differences
 from .outcome import Findings, Outcome, relative
 from .report import Finding
 from .run import Run
-from .traced import Parameter, traced_floats
+from .traced import Parameter, gradient, traced_floats
 
 TOLERANCE = 0.02
 LOST = 3
@@ -31,19 +31,6 @@ TURN = 0.01
 """The step by which directions are turned, in parts of the width of a lobe."""
 
 
-class Derivatives(NamedTuple):
-    """The derivatives of values for a parameter, of which each entry grows as :func:`_direction` says."""
-
-    of_each: Array
-    """Those of each value, by forward differentiation."""
-    total: float
-    """Their sum with some weights."""
-    size: float
-    """That of their absolute values."""
-    reverse: Array
-    """Those of the sum of the values, with these weights, for each entry, by reverse differentiation."""
-
-
 class Pairs(NamedTuple):
     """Pairs of directions."""
 
@@ -51,6 +38,12 @@ class Pairs(NamedTuple):
     wo: Array
     scale: Array
     """One over their density."""
+
+    @property
+    def weights(self) -> Array:
+        """By what to weigh values in a sum, in which no pair counts as much as another, nor does a channel."""
+        of_pairs = np.random.default_rng(20).uniform(0.5, 1.5, (len(self.wi), 1))
+        return self.scale * of_pairs * np.geomspace(1, 4, dr.size_v(mi.UnpolarizedSpectrum))
 
     def steep(self, cosine: float) -> Pairs:
         """Return those whose directions are both that far from grazing."""
@@ -125,28 +118,46 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
 def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs: Pairs) -> Array:
     """Check that derivatives are finite and the reverse ones those of forward differentiation, and return these for
     pairs as they are drawn."""
-    found, at_edges = (_derivatives(run, parameter, it) for it in (pairs, _edges(run.probe.whole)))
-    where = " at grazing or normal incidence"
+    edges, where = _edges(run.probe.whole), " at grazing or normal incidence"
+    derivatives, reverse = _derivatives(run, parameter, pairs), _reverse(run, parameter, pairs)
     for name, values in (
-        ("of its derivatives", found.of_each),
-        (f"of its derivatives{where}", at_edges.of_each),
-        ("of its derivatives by dr.backward", found.reverse),
-        (f"of its derivatives by dr.backward{where}", at_edges.reverse),
+        ("of its derivatives", derivatives),
+        (f"of its derivatives{where}", _derivatives(run, parameter, edges)),
+        ("of its derivatives by dr.backward", reverse),
+        (f"of its derivatives by dr.backward{where}", _reverse(run, parameter, edges)),
     ):
         if not np.isfinite(values).all():
             outcome.fault(f"{1 - np.isfinite(values).mean():.1%} {name} are not finite", np.inf)
-    reverse = float(np.sum(found.reverse * _direction(parameter)))
-    if abs(reverse - found.total) > TOLERANCE * found.size:
-        words = f"of a weighted sum of values is {reverse:.4g} by dr.backward, but {found.total:.4g} by dr.forward"
-        outcome.fault(f"the derivative {words}", abs(reverse - found.total) / found.size)
-    return found.of_each
+    if outcome.faults:
+        return derivatives
+    direction = _direction(parameter)
+    if not _agree(derivatives, reverse @ direction, pairs):
+        # Beyond a limit those vanish that lead further out, which are those of the negative sum.
+        reverse = np.where(reverse == 0, -_reverse(run, parameter, pairs, -1), reverse)
+    _compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs)
+    return derivatives
+
+
+def _agree(derivatives: Array, reverse: Any, pairs: Pairs) -> bool:
+    """Return whether the reverse derivative of the weighted sum of values is that of forward ones, or both are 0."""
+    weighted = pairs.weights * derivatives
+    return bool(abs(reverse - weighted.sum()) <= max(TOLERANCE * abs(weighted).sum(), 1e-6 * len(weighted)))
+
+
+def _compare_reverse(outcome: Outcome, name: str, derivatives: Array, reverse: Any, pairs: Pairs) -> None:
+    if not _agree(derivatives, reverse, pairs):
+        total = (pairs.weights * derivatives).sum()
+        told = f"of {name}, that of a weighted sum of values is {reverse:.4g} by dr.backward, but {total:.4g} by"
+        outcome.fault(f"{told} dr.forward", abs(reverse - total))
 
 
 def _direction(parameter: Parameter) -> Array:
     """Return by how much each entry of a parameter grows: one channel or texel not as another."""
     entries = np.size(np.array(parameter.value))
     # With this seed the first three, those of a colour, are far from one another.
-    return np.ones(1) if entries == 1 else np.random.default_rng(64).uniform(0.5, 1.5, entries)
+    if entries == 1 or parameter.key.endswith("wavelengths"):  # which must increase
+        return np.ones(entries)
+    return np.random.default_rng(64).uniform(0.5, 1.5, entries)
 
 
 def _along(parameter: Parameter, by: float = 1) -> Any:
@@ -155,32 +166,41 @@ def _along(parameter: Parameter, by: float = 1) -> Any:
     return type(value)(np.float32(by * _direction(parameter)).reshape(np.shape(np.array(value))))
 
 
-def _derivatives(run: Run, parameter: Parameter, pairs: Pairs) -> Derivatives:
-    """Return the derivatives for a parameter, in both ways, in which other things go wrong."""
-    count, channels = len(pairs.wi), dr.size_v(mi.UnpolarizedSpectrum)
-    # In the sum no pair counts as much as another, nor does a channel.
-    weights = pairs.scale * np.random.default_rng(20).uniform(0.5, 1.5, (count, 1)) * np.geomspace(1, 4, channels)
-    if dr.grad_enabled(result := _attached(run, parameter, pairs)):
-        _forward(parameter)
-    of_each = numbers(dr.grad(result), count).copy()
-    if dr.grad_enabled(result := _attached(run, parameter, pairs)):
-        weighted = mi.unpolarized_spectrum(result) * mi.UnpolarizedSpectrum(np.float32(weights.T))
-        dr.backward(dr.sum(weighted, axis=None))
-    return Derivatives(of_each, np.sum(weights * of_each), np.sum(weights * abs(of_each)), parameter.gradient)
+def _derivatives(run: Run, parameter: Parameter, pairs: Pairs) -> Array:
+    """Return the derivative of each value for a parameter that grows along its direction, by forward
+    differentiation."""
+    attached, values = _attached(run, parameter, pairs)
+    if dr.grad_enabled(values):
+        _forward(attached, _along(parameter))
+    return numbers(dr.grad(values), len(pairs.wi)).copy()
 
 
-def _attached(run: Run, parameter: Parameter, pairs: Pairs) -> Any:
-    """Return values that derivatives for a parameter can be taken of."""
-    parameter.attach()
-    return run.probe.bsdf.eval(run.probe.whole.context, interaction(pairs.wi), vectors(pairs.wo), True)
+def _reverse(run: Run, parameter: Parameter, pairs: Pairs, sign: int = 1) -> Array:
+    """Return the derivatives of the weighted sum of the values, or its negative, for each entry of a parameter, by
+    reverse differentiation, in which other things go wrong."""
+    attached, values = _attached(run, parameter, pairs)
+    if dr.grad_enabled(values):
+        _backward(sign * values, pairs)
+    return gradient(attached)
 
 
-def _forward(parameter: Parameter) -> None:
-    """Differentiate all that was computed of an attached parameter."""
-    value = parameter.params[parameter.key]
-    dr.set_grad(value, _along(parameter))
-    dr.enqueue(dr.ADMode.Forward, value)
+def _attached(run: Run, parameter: Parameter, pairs: Pairs) -> tuple[Any, Any]:
+    """Return a parameter that derivatives can be taken for, and the values."""
+    attached = parameter.attach()
+    return attached, run.probe.bsdf.eval(run.probe.whole.context, interaction(pairs.wi), vectors(pairs.wo), True)
+
+
+def _forward(attached: Any, direction: Any) -> None:
+    """Differentiate all that was computed of an attached parameter, which grows along a direction."""
+    dr.set_grad(attached, direction)
+    dr.enqueue(dr.ADMode.Forward, attached)
     dr.traverse(dr.ADMode.Forward)
+
+
+def _backward(values: Any, pairs: Pairs) -> None:
+    """Differentiate the weighted sum of values."""
+    weights = mi.UnpolarizedSpectrum(np.float32(pairs.weights.T))
+    dr.backward(dr.sum(mi.unpolarized_spectrum(values) * weights, axis=None))
 
 
 def _edges(part: Part) -> Pairs:
@@ -215,7 +235,7 @@ def _attempts(
         parameter.set(original + shift)
         if shift:
             # At an index of refraction of 1, no reflection turns into total reflection: look beside it.
-            derivatives = _derivatives(run, parameter, pairs).of_each
+            derivatives = _derivatives(run, parameter, pairs)
 
         def at(by: float, shift: float = shift) -> Array:
             parameter.set(original + shift + _along(parameter, by))
@@ -263,14 +283,14 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
     """Check the derivatives of ``eval_pdf``'s value and of ``sample``'s weight, where that of ``eval`` over pdf is
     ``expected``."""
     bsdf, whole, si = run.probe.bsdf, run.probe.whole, interaction(wi)
-    parameter.attach()
+    attached = parameter.attach()
     bs, weight = bsdf.sample(whole.context, si, *sample_arguments(u), True)
     value, density = bsdf.eval_pdf(whole.context, si, dr.detach(bs.wo), True)
     # Only ends of the graph keep a derivative, and the weight may depend on the direction.
     results = bs.wo * 2, weight, value / density, value / dr.detach(density)
     if dr.grad_enabled(results):
-        _forward(parameter)
-    moved, of_weight, attached, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
+        _forward(attached, _along(parameter))
+    moved, of_weight, of_densities, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
     if not np.isfinite(of_weight).all():
         lost = 1 - np.isfinite(of_weight).mean()
         outcome.fault(f"{lost:.1%} of the derivatives of sample's weight are not finite", np.inf)
@@ -278,7 +298,7 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
     if not size > DARK:
         return
     # Plugins other than ours may differentiate their density, too.
-    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(attached)]
+    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_densities)]
     compared = [("eval_pdf's value over pdf", of_pair, [expected])]
     if not moved.any():
         compared.append(("sample's weight", of_weight, accepted))
@@ -307,14 +327,14 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
     def backward(value: float, signs: tuple[int, ...] = (1,)) -> tuple[Array, list[Array]]:
         """Return the values there, and the derivatives of their sum with some signs."""
         parameter.set(zero + value)
-        result, found = _attached(run, parameter, pairs), []
+        (attached, result), found = _attached(run, parameter, pairs), []
         for sign in signs:
             if dr.grad_enabled(result):
-                dr.set_grad(parameter.params[parameter.key], 0)
+                dr.set_grad(attached, 0)
                 dr.set_grad(result, sign)
                 dr.enqueue(dr.ADMode.Backward, result)
                 dr.traverse(dr.ADMode.Backward, flags=dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
-            found.append(parameter.gradient)
+            found.append(gradient(attached))
         return numbers(dr.detach(result), len(pairs.wi)), found
 
     beyond = limit + step
@@ -355,8 +375,8 @@ def _directional(run: Run, pairs: Pairs | None) -> Finding:
         if not dr.grad_enabled(result):
             continue
         dr.backward(dr.sum(result, axis=None))
-        for word, gradient in (("wi", dr.grad(si.wi)), ("wo", dr.grad(towards))):
-            found = numbers(gradient, len(wi))
+        for word, derivative in (("wi", dr.grad(si.wi)), ("wo", dr.grad(towards))):
+            found = numbers(derivative, len(wi))
             bad = np.logical_not(np.isfinite(found).all(axis=1))
             why = f"as of {bad.mean():.1%} of the pairs tried"
             outcome.wrong(bad, f"the derivative of {name} for {word}", found, why, wi, wo)
@@ -379,14 +399,21 @@ def _compare_directional(run: Run, outcome: Outcome, pairs: Pairs) -> str:
 
     if not abs(at(0) * pairs.scale).mean() > DARK:
         return ""
-    angle, si = mi.Float(0), interaction(pairs.wi)
-    dr.enable_grad(angle)
-    si.wi, towards = (vectors(w) + angle * vectors(axis) for w, axis in zip(directions, axes, strict=True))
-    result = probe.bsdf.eval(part.context, si, towards, True)
+
+    def turned() -> tuple[mi.Float, Any]:
+        angle, si = mi.Float(0), interaction(pairs.wi)
+        dr.enable_grad(angle)
+        si.wi, towards = (vectors(w) + angle * vectors(axis) for w, axis in zip(directions, axes, strict=True))
+        return angle, probe.bsdf.eval(part.context, si, towards, True)
+
+    angle, result = turned()
     if not dr.grad_enabled(result):
         return ""
     dr.forward(angle)
     derivative = numbers(dr.grad(result), len(pairs.wi))
+    angle, result = turned()
+    _backward(result, pairs)
+    _compare_reverse(outcome, "the derivatives for wi and wo", derivative, dr.grad(angle)[0], pairs)
     found = differences(at, step)
     found = found._replace(noise=found.noise + 1e-7 * abs(found.low) / step)
     if found.trusted.mean() < 0.5:

@@ -31,17 +31,14 @@ class Parameter(NamedTuple):
         self.params[self.key] = type(self.params[self.key])(value)
         self.params.update()
 
-    def attach(self) -> None:
-        """Make it what derivatives are taken for, until it is set."""
+    def attach(self) -> Any:
+        """Make it what derivatives are taken for, until it is set, and return that: a plugin may hold what it computes
+        of it, as ``principled`` does."""
         value = dr.detach(self.value)
         dr.enable_grad(value)
         self.params[self.key] = value
         self.params.update()
-
-    @property
-    def gradient(self) -> Array:
-        """The derivatives for its entries, in float64."""
-        return np.array(dr.grad(self.params[self.key]), np.float64).ravel()
+        return value
 
     @contextmanager
     def restored(self) -> Iterator[Any]:
@@ -51,6 +48,11 @@ class Parameter(NamedTuple):
             yield original
         finally:
             self.set(original)
+
+
+def gradient(attached: Any) -> Array:
+    """Return the derivatives for the entries of an attached parameter, in float64."""
+    return np.array(dr.grad(attached), np.float64).ravel()
 
 
 def traced_floats(run: Run, check: str, differentiable: bool = False) -> tuple[list[Parameter], list[Finding]]:
