@@ -344,6 +344,9 @@ FALSE_ALARMS = {
     "lines at the horizon": case("chi2 pdf", "schlick", 60, roughness=1.1e-5, variant="interreflection"),
     "beyond what a choice leaves of a range": case("gradients", "cooktorrance", distribution="blinn", alpha=1.5),
     "narrow along and across": case(NARROW, "walter", alpha_u=0.0041, alpha_v=0.00035),
+    "a band that is empty": case(
+        "gradients continuity", "toon", diffuse_threshold=1.0, diffuse_smooth=0.0, diffuse_shadow=0.9
+    ),
     "diffuse lobe beside facets": case("albedo", "walter", diffuse_reflectance=0.9, f0=0.9),
     "texels beyond a limit": case("gradients", "phong", specular_reflectance=texels(True)),
     "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),

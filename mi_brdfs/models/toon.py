@@ -87,13 +87,13 @@ class Step:
     def __init__(self, threshold: mi.Float, smooth: mi.Float) -> None:
         self.threshold, self.smooth = threshold, smooth
         self.start = self._integral(-threshold)
-        self.mass = self._integral(1 - threshold) - self.start
+        # An empty band has the derivative of a narrow one, so that an optimisation leaves it.
+        self.mass = self._integral(1 - threshold + EPSILON) - self.start
 
     @staticmethod
     def _x(smooth: mi.Float, excess: mi.Float) -> mi.Float:
-        # The floor turns an edge of width 0 into a jump.
-        smooth = dr.maximum(smooth, EPSILON)
-        return dr.clip((excess + smooth) / (2 * smooth), 0, 1)
+        # The floor turns an edge of width 0 into a jump, which is dark itself.
+        return dr.clip((excess + smooth) / (2 * dr.maximum(smooth, EPSILON)), 0, 1)
 
     def _integral(self, excess: mi.Float) -> mi.Float:
         """Return the integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""

@@ -130,22 +130,28 @@ def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs:
             outcome.fault(f"{1 - np.isfinite(values).mean():.1%} {name} are not finite", np.inf)
     if outcome.faults:
         return derivatives
-    direction = _direction(parameter)
-    if not _agree(derivatives, reverse @ direction, pairs):
+    direction, light = _direction(parameter), _light(run, pairs) / max(_size(parameter), 1)
+    if not _agree(derivatives, reverse @ direction, pairs, light):
         # Beyond a limit those vanish that lead further out, which are those of the negative sum.
         reverse = np.where(reverse == 0, -_reverse(run, parameter, pairs, -1), reverse)
-    _compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs)
+    _compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs, light)
     return derivatives
 
 
-def _agree(derivatives: Array, reverse: Any, pairs: Pairs) -> bool:
-    """Return whether the reverse derivative of the weighted sum of values is that of forward ones, or both are 0."""
+def _light(run: Run, pairs: Pairs) -> float:
+    """Return the weighted sum of the values."""
+    return float(np.nansum(pairs.weights * run.probe.eval(run.probe.whole, pairs.wi, pairs.wo)))
+
+
+def _agree(derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> bool:
+    """Return whether the reverse derivative of the weighted sum of values is that of the forward ones, but for rounding
+    of the ``light``."""
     weighted = pairs.weights * derivatives
-    return bool(abs(reverse - weighted.sum()) <= max(TOLERANCE * abs(weighted).sum(), 1e-6 * len(weighted)))
+    return bool(abs(reverse - weighted.sum()) <= max(TOLERANCE * abs(weighted).sum(), DARK * light))
 
 
-def _compare_reverse(outcome: Outcome, name: str, derivatives: Array, reverse: Any, pairs: Pairs) -> None:
-    if not _agree(derivatives, reverse, pairs):
+def _compare_reverse(outcome: Outcome, name: str, derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> None:
+    if not _agree(derivatives, reverse, pairs, light):
         total = (pairs.weights * derivatives).sum()
         told = f"of {name}, that of a weighted sum of values is {reverse:.4g} by dr.backward, but {total:.4g} by"
         outcome.fault(f"{told} dr.forward", abs(reverse - total))
@@ -220,10 +226,9 @@ def _attempts(
     derivatives there; ``derivatives`` are those at its value."""
     original, (lowest, highest) = parameter.value, limits or (-np.inf, np.inf)
     entries = np.array(original, np.float64)
-    least, most, size = entries.min(), entries.max(), abs(entries).mean()
+    least, most, size = entries.min(), entries.max(), _size(parameter)
     rounding = ROUNDING
     if _turns(parameter):
-        size = min(size, 1)  # many turns are as few
         # Turned directions are rounded anew, which a narrow lobe sees.
         rounding += 1e-7 / min(run.spread(run.probe.whole), 1)
     step = 0.01 * size if size > 0 else 0.01
@@ -249,6 +254,12 @@ def _attempts(
         yield found, derivatives
         if found.trusted.mean() > 0.95:
             return
+
+
+def _size(parameter: Parameter) -> float:
+    """Return the mean size of the entries of a parameter."""
+    size = float(abs(np.array(parameter.value, np.float64)).mean())
+    return min(size, 1) if _turns(parameter) else size  # many turns are as few
 
 
 def _turns(parameter: Parameter) -> bool:
@@ -413,7 +424,7 @@ def _compare_directional(run: Run, outcome: Outcome, pairs: Pairs) -> str:
     derivative = numbers(dr.grad(result), len(pairs.wi))
     angle, result = turned()
     _backward(result, pairs)
-    _compare_reverse(outcome, "the derivatives for wi and wo", derivative, dr.grad(angle)[0], pairs)
+    _compare_reverse(outcome, "the derivatives for wi and wo", derivative, dr.grad(angle)[0], pairs, _light(run, pairs))
     found = differences(at, step)
     found = found._replace(noise=found.noise + 1e-7 * abs(found.low) / step)
     if found.trusted.mean() < 0.5:
