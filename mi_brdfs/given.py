@@ -12,7 +12,7 @@ import mitsuba as mi
 from .mitsuba.errors import one_line
 from .parameters.messages import brief
 from .probe.bsdf import load
-from .probe.sources import find_sources
+from .probe.sources import BSDFSource, find_sources
 
 
 def check_given(bsdf: Any) -> None:
@@ -31,11 +31,18 @@ def described(bsdf: str | dict[str, Any] | mi.BSDF) -> dict[str, Any] | mi.BSDF:
     or for several, or with what Mitsuba says where it cannot be loaded."""
     if not isinstance(bsdf, str):
         return bsdf
+    sources = sources_of(bsdf)
+    if len(sources) > 1:
+        raise ValueError(f"{bsdf} has {len(sources)} materials; name one of them, such as {sources[0].word}.")
     with _as_value_error():
-        sources = list(find_sources(bsdf))
-        if len(sources) > 1:
-            raise ValueError(f"{bsdf} has {len(sources)} materials; name one of them, such as {sources[0].word}.")
         return sources[0].load()
+
+
+def sources_of(word: str) -> list[BSDFSource]:
+    """Return the BSDFs that a word stands for. Raise a ValueError if it stands for none, or with what Mitsuba says
+    where one cannot be loaded."""
+    with _as_value_error():
+        return list(find_sources(word))
 
 
 def load_described(bsdf: dict[str, Any] | mi.BSDF) -> mi.BSDF:

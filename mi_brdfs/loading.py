@@ -49,16 +49,22 @@ def load(
         config.merge_equivalent = merge
         # Mitsuba merges what is turned inside out with what is not, and fails.
         config.merge_meshes = merge and "flip_normals" not in (upgraded or "")
-        try:
+        with naming(path, upgraded):
             mi.parser.transform_all(config, state)
             if only is not None:
                 state.nodes[0] = state.nodes[_bsdfs(state)[only]]
             return instantiated(config, state)
-        except RuntimeError as error:  # of a file that was given a version
-            place = "string" if upgraded else str(path)
-            raise RuntimeError(
-                str(error).replace("loading string (line", f"loading {place} (line")
-            ) from error.__cause__
+
+
+@contextmanager
+def naming(path: Path, upgraded: str | None) -> Iterator[None]:
+    """Name a file in what Mitsuba says, which has its text as a string if it was upgraded or given a version."""
+    try:
+        yield
+    except RuntimeError as error:
+        place = f"{path}, upgraded" if upgraded else str(path)
+        text = re.sub(r"\b(At|loading) string \(line", lambda found: f"{found[1]} {place} (line", str(error))
+        raise RuntimeError(text) from error.__cause__
 
 
 def ids_of_bsdfs(path: Path, parameters: Mapping[str, str]) -> list[str]:

@@ -317,6 +317,7 @@ def test_runs_without_a_variant_for_it(ward):
         ("shapes", "ward", {}, "Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,), or (N, 3) of"),
         ("short", "ward", {}, "Arrays (wi, wo, f): directions must have the length 1, not 0.5."),
         ("nothing", "ward", {}, "There are no data to fit."),
+        ("good", [], {}, "There is no model to fit"),
         ("file", "ward", {}, "none.bsdf: No such file or directory."),
     ],
 )  # fmt: skip

@@ -12,12 +12,12 @@ import mitsuba as mi
 import numpy as np
 from rich.table import Column, Table
 
-from ..given import load_described
+from ..given import load_described, sources_of
 from ..mitsuba import guests
 from ..probe.arrays import Array, interaction, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe
 from ..probe.directions import hemisphere
-from ..probe.sources import BSDFSource, find_sources
+from ..probe.sources import BSDFSource
 from ..probe.variates import random
 from ..variants import is_measurable
 from .pictures import SIZE, bsdf_of, first_pictures, render_in_turn, sphere
@@ -81,7 +81,7 @@ def compare(*bsdfs: str | dict | BSDFSource, on_progress: Callable[[str], None] 
     """
     if not is_measurable(mi.variant()):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {mi.variant()}.")
-    found: list[Any] = [it for given in bsdfs for it in (find_sources(given) if isinstance(given, str) else [given])]
+    found: list[Any] = [it for given in bsdfs for it in (sources_of(given) if isinstance(given, str) else [given])]
     names = [it["type"] if isinstance(it, dict) else it.name for it in found]
     if len(found) not in (1, 2):
         words = ", ".join(str(it["type"]) if isinstance(it, dict) else it.word for it in found)

@@ -108,6 +108,8 @@ def fit(
     if starts < 0 or lobes < 1 or pairs < 2 or not 0 < cut <= 90:
         raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2 and a cut in (0, 90] degrees.")
     models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
+    if not models:
+        raise FitError("There is no model to fit; name one or more.")
     check_names(models, [*(given or {}), *(tied or {}), *(tied or {}).values()])
     given_starts = [start] if isinstance(start, Mapping) else list(start)
     if not starts and not given_starts:

@@ -82,6 +82,8 @@ def _bounded(work: Work, element: Element) -> Element:
 
 @rule("bsdf", "conductor", "roughconductor")
 def _conductor(work: Work, element: Element) -> Element:
+    if material := element["material"]:  # whose file some systems find in any case
+        material.value = {it.lower(): it for it in conductors()}.get(material.value.lower(), material.value)
     if element["eta"] or element["k"]:
         _eta_and_k(work, element)
     exterior, given = element.pop("ext_eta"), [it for it in element.of("rgb", "float") if it.name in ("eta", "k")]

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 import numpy as np
 
-from ..given import load_described
+from ..given import load_described, sources_of
 from ..measured import read
 from ..mitsuba.registry import find_model, list_models
 from ..parameters.messages import brief
 from ..probe.bsdf import BSDFProbe
 from ..probe.curves import Curve
-from ..probe.sources import find_sources, measured_file, name_of
+from ..probe.sources import measured_file, name_of
 from ..variants import is_measurable
 from .style import CHANNELS, Place, plain
 
@@ -157,7 +157,7 @@ def _told(word: str, parameters: dict[str, str]) -> str:
 
 def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
     """Yield what a user gave, loaded, with its label: for a measured file, its title."""
-    found = ((it.name, it.load()) for it in find_sources(given)) if isinstance(given, str) else [("", given)]
+    found = ((it.name, it.load()) for it in sources_of(given)) if isinstance(given, str) else [("", given)]
     for name, loaded in found:
         file = measured_file(loaded) if isinstance(loaded, dict) else None
         measurement = read(*file) if file else None

@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 import mitsuba as mi
 
 from ..legacy import upgrade
-from ..loading import file_names, instantiated, load_text, looking_in, parsed, referred
+from ..loading import file_names, instantiated, load_text, looking_in, naming, parsed, referred
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -79,7 +79,7 @@ class SceneFile:
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
         config = mi.parser.ParserConfig(mi.variant())
         with looking_in(path.parent, *folders):
-            state, _ = parsed(config, path, self.lenient, self.parameters)
+            state, upgraded = parsed(config, path, self.lenient, self.parameters)
             for props, key in file_names(state):
                 props[key] = names.get(props[key], props[key])
             config.merge_equivalent = config.merge_meshes = not (self.keeps_ids or self.replaced)
@@ -91,7 +91,8 @@ class SceneFile:
                 _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
             if self.box_filter:
                 _set_box_filters(state)
-            return instantiated(config, state)
+            with naming(path, upgraded):
+                return instantiated(config, state)
 
 
 def _check_counts(state: Any) -> None:
