@@ -568,6 +568,19 @@ class SharesKept(adapter.ModelBSDF):
         return self._sample(valid, mixture, components, frame, sample1, sample2)
 
 
+def takes_the_first_name(own, self, keys=()):
+    """Keep two values, after an update the first one that is named alone."""
+    own(self, keys)
+    named = [name for name in TWO if name in keys][:1] if keys else TWO
+    found = {name: dr.detach(self.textures[name].eval(dr.zeros(mi.SurfaceInteraction3f))) for name in named}
+    self.kept = {**getattr(self, "kept", {}), **found}
+
+
+def as_bright_as_kept(own, self, *given):
+    value, pdf = own(self, *given)
+    return value * sum(self.kept.values()), pdf
+
+
 def no_number_in_the_horizon(ctx, si, wo):
     """Divides zero by zero where light comes along the surface."""
     return dr.select(si.wi.z == 0, mi.Float(dr.nan), 1)
@@ -1025,6 +1038,13 @@ MUTANTS = [
     mutant("grey of eval_pdf", "colours", Lambert, adapted(eval_pdf=greyed_pair)),
     mutant("grey in light tracing", "colours", Lambert, adapted(eval=greyed_in_light_tracing)),
     mutant("grey reflectance", "colours", Lambert, reflectance(greyed)),
+    mutant(
+        "first of the names alone",
+        "updates",
+        Phong,
+        adapted(parameters_changed=takes_the_first_name, eval_pdf=as_bright_as_kept),
+        **TWO,
+    ),
     mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),

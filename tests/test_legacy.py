@@ -11,8 +11,10 @@ import importlib
 import os
 import random
 import re
+import struct
 import sys
 import time
+import zlib
 from xml.etree import ElementTree
 
 import drjit as dr
@@ -466,6 +468,45 @@ def test_colours_of_vertices(load, folder, kind, value, linear):
     reflectance = numbers(si.bsdf().eval(mi.BSDFContext(), si, mi.Vector3f(0, 0, 1))).ravel() * np.pi
     np.testing.assert_allclose(reflectance, value / (255 if kind == "uchar" else 1), 1e-5)
     assert f"{1 if linear else 2} approximated" in warning
+
+
+OCTAHEDRON = np.float32([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+FACES = np.uint32([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
+
+
+def octahedron(path, normals):
+    """Write one with vertex normals or without, outside of which its faces are seen."""
+    if path.suffix == ".serialized":
+        flags, name, sizes = 0x1000 | normals, b"octahedron\0", struct.pack("<QQ", len(OCTAHEDRON), len(FACES))
+        vertices = OCTAHEDRON.tobytes() * (1 + normals)
+        mesh = struct.pack("<HH", 0x041C, 4) + zlib.compress(
+            struct.pack("<I", flags) + name + sizes + vertices + FACES.tobytes()
+        )
+        path.write_bytes(mesh + struct.pack("<QI", 0, 1))
+        return
+    names = [*"xyz", "nx", "ny", "nz"][: 3 * (1 + normals)]
+    header = ["ply", "format ascii 1.0", f"element vertex {len(OCTAHEDRON)}", *(f"property float {it}" for it in names)]
+    header += [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header"]
+    lines = [" ".join(map(str, [*it] * (1 + normals))) for it in OCTAHEDRON.tolist()]
+    path.write_text("\n".join([*header, *lines, *(f"3 {a} {b} {c}" for a, b, c in FACES.tolist()), ""]))
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+@pytest.mark.parametrize("mirror", ["", '<scale x="-1"/>'])
+@pytest.mark.parametrize("kind, normals", [("serialized", False), ("serialized", True), ("ply", True), ("cube", None)])
+def test_the_inside_of_a_mirrored_shape_stays_inside(load, folder, kind, normals, mirror):
+    """As the exterior medium and the front of a BSDF tell."""
+    if kind != "cube":
+        octahedron(folder / f"octahedron.{kind}", normals)
+    file = f'<string name="filename" value="octahedron.{kind}"/>' if kind != "cube" else ""
+    scene, _ = load(
+        '<medium type="homogeneous" id="air"/>'
+        '<medium type="homogeneous" id="fog"><float name="scale" value="2"/></medium>'
+        f'<shape type="{kind}">{file}<transform name="toWorld">{mirror}</transform><bsdf type="diffuse"/>'
+        '<ref name="exterior" id="air"/><ref name="interior" id="fog"/></shape>'
+    )
+    si = scene.ray_intersect(mi.Ray3f([0.2, 0.1, 5], [0, 0, -1]))
+    assert si.wi.z[0] > 0 and si.target_medium(mi.Vector3f(0, 0, 1))[0].id() == "air"
 
 
 def test_files_are_found_from_where_a_link_leads(folder, upgraded, tmp_path):

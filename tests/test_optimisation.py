@@ -7,9 +7,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from fuzzing import Quantity, ways
+from reference import fresnel_conductor
 from support import hemisphere, interaction, numbers
 
 import mi_brdfs
+from mi_brdfs.microfacet.fresnel import Conductor
 from mi_brdfs.mitsuba.registry import own_models
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -282,3 +284,22 @@ def test_a_black_surface_can_become_brighter(bsdf):
     si.wi = mi.Vector3f(0, 0, 1)
     dr.backward(mi.luminance(loaded.eval(mi.BSDFContext(), si, mi.Vector3f(0.6, 0, 0.8), True)))
     assert dr.grad(params[key])[0] > 0.1
+
+
+@pytest.mark.parametrize("k", [0.0, 1e-4, 0.01, 1.0])
+@pytest.mark.parametrize("eta", [0.2, 0.5, 1.5])
+def test_derivatives_for_the_extinction(eta, k):
+    """Also where hardly any light is absorbed and all of it reflected, beyond the critical angle. Where it vanishes at
+    0, it is another, with which an optimisation leaves it."""
+    cos, step = np.cos(np.radians([10, 40, 50, 60, 80])), 1e-6
+    extinction = dr.full(mi.Float, k, len(cos))
+    dr.enable_grad(extinction)
+    found = Conductor(mi.Float(eta), extinction)(mi.Float(cos))
+    dr.forward(extinction)
+    expected = (fresnel_conductor(cos, eta, k + step) - fresnel_conductor(cos, eta, k)) / step
+    counts = (expected < -0.01) if k == 0 else np.ones(len(cos), bool)
+    assert counts.any() or eta > 1
+    np.testing.assert_allclose(
+        np.array(dr.grad(found))[counts], expected[counts], rtol=2e-3, atol=1e-4
+    )  # of terms near 1
+    np.testing.assert_allclose(np.array(found), fresnel_conductor(cos, eta, k), atol=1e-6)

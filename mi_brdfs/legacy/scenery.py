@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import importlib
 import re
+import struct
+import zlib
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import mitsuba as mi
@@ -89,8 +92,46 @@ def _round(work: Work, element: Element) -> None:
         element.set("radius", scale * element.number("radius", 1))
 
 
+@rule("shape", "rectangle", "cube", "serialized")
+def _mirrored(work: Work, element: Element) -> None:
+    """Keep the inside of a mirrored shape inside: 0.6 turns the faces of serialized meshes, and finds the exterior
+    medium on that side of a face on which its vertex normals are."""
+    transform = element["to_world"]
+    if not transform or np.linalg.det(_matrix(transform)[:3, :3]) >= 0:
+        return
+    if element.text("face_normals") != "true" and _has_vertex_normals(work, element):
+        for it in element.children:
+            if other := {"interior": "exterior", "exterior": "interior"}.get(it.name):
+                it.name = other
+                work.changed(element, f"the {other} of a mirrored {element.type} was the other one")
+    elif element.type == "serialized":
+        element.set("flip_normals", element.text("flip_normals") != "true")
+        work.changed(element, "a mirrored serialized mesh has flip_normals")
+
+
+def _has_vertex_normals(work: Work, element: Element) -> bool:
+    if element.type in ("rectangle", "cube"):
+        return True
+    if not (name := element["filename"]):  # of a file that is missing
+        return False
+    content = (work.folder / name.value).read_bytes()
+    if element.type == "obj":
+        return re.search(rb"^\s*vn\s", content, re.MULTILINE) is not None
+    if element.type == "ply":
+        return re.search(rb"^property\s+\w+\s+nx\s*$", content[:HEAD], re.MULTILINE) is not None
+    with suppress(struct.error, zlib.error, IndexError):
+        # The offsets of the meshes stand at the end, and each begins with flags, compressed.
+        (version,), (count,) = struct.unpack_from("<H", content, 2), struct.unpack_from("<I", content, len(content) - 4)
+        offsets = struct.Struct(f"<{count}{'Q' if version > 3 else 'I'}")
+        index = int(element.number("shape_index", 0))
+        start = offsets.unpack_from(content, len(content) - 4 - offsets.size)[index] + 4
+        return zlib.decompressobj().decompress(content[start:], 4)[0] & 1 > 0
+    return False
+
+
 @rule("shape", "obj")
 def _obj(work: Work, element: Element) -> None:
+    _mirrored(work, element)
     bsdfs = [it for it in element.children if work.resolved(it).tag == "bsdf"]
     if len(bsdfs) > 1:
         element.children = [it for it in element.children if it not in bsdfs[1:]]
@@ -103,6 +144,7 @@ def _obj(work: Work, element: Element) -> None:
 
 @rule("shape", "ply")
 def _ply(work: Work, element: Element) -> None:
+    _mirrored(work, element)
     encoded, name = not (srgb := element.pop("srgb")) or srgb.value == "true", element["filename"]
     attributes = [it for it in work.reached(element) if it.type == "mesh_attribute"]
     if not attributes or name is None:

@@ -201,6 +201,8 @@ def _mixture(work: Work, element: Element) -> Element:
     if element.tag == "bsdf" and sum(weights) < 1 - 1e-6:  # the rest absorbs
         parts.append(plugin("bsdf", "diffuse", reflectance=[0.0]))
         weights.append(1 - sum(weights))
+    elif sum(weights) < 1 - 1e-6:
+        work.approximated(element, f"the weights of {element.type} add up to 1: what the rest absorbs is scattered")
     if sum(weights) > 1 + 1e-6 and element.text("ensure_energy_conservation") == "false":
         work.approximated(element, f"the weights of {element.type} are scaled to add up to 1, not {sum(weights):g}")
     work.changed(element, f"{element.type} is blend{element.tag}, nested for more than two")

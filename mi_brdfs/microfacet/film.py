@@ -74,7 +74,10 @@ class Film(Fresnel):
     """
 
     def __init__(self, base: Interface, index: Any, thickness: Any) -> None:
-        self.base, self.index = base, clamp(index / base.exterior, 1, dr.inf)
+        exterior = dr.detach(base.exterior)
+        # Below the exterior's index only that of the film has a derivative, which leads back.
+        relative = dr.select(index < exterior, 1, exterior / base.exterior)
+        self.base, self.index = base, clamp(index / exterior, 1, dr.inf) * relative
         self.thickness = thickness * base.exterior
 
     def __call__(self, cos: mi.Float) -> Spectrum:
@@ -184,12 +187,12 @@ class Waves:
         with dr.suspend_grad():
             every = [(weight, rate, e / (ONE + c * e)) for weight, rate, e in self.all]
             mean = sum((h * weight for weight, _, h in every), Complex(0))
-        if not dr.grad_enabled(c, self.path):
-            return mean
-        with dr.suspend_grad():
-            by_c = sum((h * h * weight for weight, _, h in every), Complex(0))
-            by_path = sum((rate * h * (ONE - c * h) * weight for weight, rate, h in every), Complex(0))
-        return mean - by_c * (c - dr.detach(c)) + by_path * (self.path - dr.detach(self.path))
+        for x, slope in ((c, lambda rate, h: h * h * -1), (self.path, lambda rate, h: rate * h * (ONE - c * h))):
+            if dr.grad_enabled(x):
+                with dr.suspend_grad():
+                    by_x = sum((slope(rate, h) * weight for weight, rate, h in every), Complex(0))
+                mean += by_x * (x - dr.detach(x))
+        return mean
 
 
 class Airy:

@@ -164,13 +164,9 @@ class Conductor(Interface):
         self.eta, self.k = eta, k
 
     def __call__(self, cos: mi.Float) -> Spectrum:
+        a, _, modulus = self._refracted(cos)
         cos2 = cos * cos
         sin2 = 1 - cos2
-        # a + ib = sqrt((η - ik)² - sin²θ)
-        eta2, k2 = self.eta * self.eta, square(self.k)
-        real = eta2 - k2 - sin2
-        modulus = safe_sqrt(real * real + 4 * eta2 * k2)
-        a = safe_sqrt(0.5 * (modulus + real))
         even_s, odd_s = modulus + cos2, 2 * cos * a
         # Rounding may leave less than 0, and an index of 1 has nothing but 0 at grazing.
         s = dr.maximum(even_s - odd_s, 0) / dr.maximum(even_s + odd_s, EPSILON)
@@ -179,11 +175,18 @@ class Conductor(Interface):
         return 0.5 * s * (1 + p)
 
     def refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum]:
-        real, ab = self.eta * self.eta - self.k * self.k - (1 - cos * cos), self.eta * self.k
+        a, b, _ = self._refracted(cos)
+        return a, b
+
+    def _refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum, Spectrum]:
+        """Return a, b and a² + b²."""
+        eta2, k2 = self.eta * self.eta, square(self.k)
+        real = eta2 - k2 - (1 - cos * cos)
+        modulus = safe_sqrt(real * real + 4 * eta2 * k2)
         # The smaller one of a and b as their product over the larger one, which keeps its digits.
-        larger = dr.sqrt(dr.maximum(0.5 * (safe_sqrt(real * real + 4 * ab * ab) + dr.abs(real)), TINY))
-        smaller, steep = ab / larger, real > 0
-        return dr.select(steep, larger, smaller), dr.select(steep, smaller, larger)
+        larger = dr.sqrt(dr.maximum(0.5 * (modulus + dr.abs(real)), TINY))
+        smaller, steep = self.eta * self.k / larger, real > 0
+        return dr.select(steep, larger, smaller), dr.select(steep, smaller, larger), modulus
 
     def brightness(self, cos: mi.Float) -> mi.Float:
         # Of channels that differ much the mean index may reflect almost nothing where they do.

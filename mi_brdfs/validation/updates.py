@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -35,13 +36,15 @@ def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
     value: ``eval``, ``pdf`` and the weights of delta functions are the same to float32's rounding, and so are
     directions drawn, but for few. And what is set of one changes no other BSDF of the plugin; and
-    ``parameters_changed`` without names takes up any change, and of texels and tables no more than with their names.
-    For this the BSDF must be given as a dict."""
+    ``parameters_changed`` without names takes up any change, and no more than with the names of texels, of tables, and
+    of all parameters that are set together, as optimisers do. For this the BSDF must be given as a dict."""
     described = run.described("To load it with another value")
     parameters, _ = traced_floats(run, "updates")
     wi, u = on_side(hemisphere(COUNT, 91), run.probe.whole.sides[0]), random(COUNT, SEED)
     drawn = Drawn(wi, run.probe.sample(run.probe.whole, wi, u).wo, u)
     findings = [finding for each in parameters if (finding := _updated(run, each, described, drawn))]
+    if len(findings) > 1:
+        findings.append(_together(run, parameters, drawn))
     words = "It has no parameters that could be given as a number or a colour."
     yield from findings or [Finding("updates", "whole", "skip", words)]
 
@@ -51,7 +54,9 @@ def _updated(run: Run, parameter: Parameter, described: dict[str, Any], drawn: D
     outcome, (name, _, rest) = Outcome("updates", parameter.key), parameter.key.partition(".")
     with parameter.restored() as original:
         if rest not in ("", "value") or dr.width(original) != 1:
-            _check_taken_up(run, outcome, parameter, drawn)
+            entries = np.array(original)
+            parameter.set(entries * np.linspace(0.7, 1, entries.size, dtype=entries.dtype).reshape(entries.shape))
+            _check_taken_up(run, outcome, drawn, "once it is changed,")
             return outcome.finding("Once it is changed, all of it is taken up.")
         value = original * 0.95 + 1e-3
         number = numbers(value, 1)[0]
@@ -75,6 +80,18 @@ def _updated(run: Run, parameter: Parameter, described: dict[str, Any], drawn: D
         back = run.probe.values(drawn.wi, drawn.wo)
         _compare(run, outcome, drawn, "once it is set back,", back, before, f"before: {UNNOTICED}")
     return outcome.finding("Set and updated, it acts as loaded.")
+
+
+def _together(run: Run, parameters: list[Parameter], drawn: Drawn) -> Finding:
+    """Return what is found as all parameters are set before one update."""
+    outcome = Outcome("updates", "whole")
+    with ExitStack() as stack:
+        originals = [stack.enter_context(each.restored()) for each in parameters]
+        for each, original in zip(parameters, originals, strict=True):
+            each.params[each.key] = original * 0.95 + 1e-3
+        parameters[0].params.update()
+        _check_taken_up(run, outcome, drawn, "once all are changed together,")
+    return outcome.finding("Changed together, all are taken up.")
 
 
 def _compare(
@@ -102,11 +119,10 @@ def _check_as_loaded(run: Run, outcome: Outcome, fresh: BSDFProbe, drawn: Drawn,
     outcome.astray(once, got, expected, f"by the same variates {as_loaded}", wi, SEED, but_for=0.1)
 
 
-def _check_taken_up(run: Run, outcome: Outcome, parameter: Parameter, drawn: Drawn) -> None:
-    """Check that new texels or entries of a table, which no dict need give, are all taken up once they are set: then
+def _check_taken_up(run: Run, outcome: Outcome, drawn: Drawn, once: str) -> None:
+    """Check that new values, texels or entries of a table are all taken up once they are set: then
     ``parameters_changed`` without names changes nothing more."""
-    probe, value = run.probe, np.array(parameter.value)
-    parameter.set(value * np.linspace(0.7, 1, value.size, dtype=value.dtype).reshape(value.shape))
+    probe = run.probe
 
     def found() -> list[Value]:
         samples = probe.sample(probe.whole, drawn.wi, drawn.u)
@@ -117,7 +133,7 @@ def _check_taken_up(run: Run, outcome: Outcome, parameter: Parameter, drawn: Dra
     named = found()
     probe.bsdf.parameters_changed([])
     why = "after parameters_changed without names: what is kept of it is out of date"
-    _compare(run, outcome, drawn, "once it is changed,", named, found(), why)
+    _compare(run, outcome, drawn, once, named, found(), why)
 
 
 def recompiles(run: Run) -> Findings:
