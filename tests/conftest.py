@@ -52,13 +52,15 @@ def no_lanes_left():
 
 @pytest.fixture
 def as_before():
-    """Names of plugins and words of the kit go back to whom they belonged to; Mitsuba itself cannot forget one."""
+    """Names of plugins and words of the kit go back to whom they belonged to; Mitsuba itself cannot forget one. And
+    BSDFs go whose errors keep them alive: pictures call them, too."""
     tables = [MODELS, *(table for choice in KIT.values() for table in (choice.words, choice.terms))]
     former = [dict(table) for table in tables]
     yield
     for table, was in zip(tables, former, strict=True):
         table.clear()
         table.update(was)
+    gc.collect()
 
 
 @pytest.fixture(scope="module", params=["llvm_ad_rgb", *OTHER_VARIANTS])

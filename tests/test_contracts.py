@@ -230,7 +230,7 @@ def test_an_error_of_the_author_has_its_line():
 
     class Misspelt(LambertLobe):
         def eval_pdf(self, wi, wo):
-            return self.colour * wo.zz, wo.z
+            return super().eval_pdf(wi, wo)[0] * wo.zz, wo.z
 
     at = undefined.__code__.co_firstlineno + 1
     model(undefined, reflectance=Reflectance(0.5, "albedo"))

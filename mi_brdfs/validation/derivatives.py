@@ -3,52 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
 from ..parameters import Range, nested
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
-from ..probe.bsdf import Part
-from ..probe.directions import direction, hemisphere, on_side
+from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from ..ranges import declared, limits_of
 from .differences import ROUNDING, Differences, differences
+from .directional import directional
 from .outcome import Findings, Outcome, relative
+from .pairs import (
+    DARK,
+    TOLERANCE,
+    Pairs,
+    agree,
+    compare_differences,
+    compare_reverse,
+    differentiate_sum,
+    edges_of,
+    light_of,
+)
 from .report import Finding
 from .run import Run
 from .traced import Parameter, gradient, traced_floats
 
-TOLERANCE = 0.02
-LOST = 3
-"""How many times its last digit a value may be off, as of formulas whose terms cancel."""
 COUNT = 2000
-DARK = 1e-5
-"""What part of the light is rounding, as where an index of refraction of 1 reflects nothing."""
-TURN = 0.01
-"""The step by which directions are turned, in parts of the width of a lobe."""
-
-
-class Pairs(NamedTuple):
-    """Pairs of directions."""
-
-    wi: Array
-    wo: Array
-    scale: Array
-    """One over their density."""
-
-    @property
-    def weights(self) -> Array:
-        """By what to weigh values in a sum, in which no pair counts as much as another, nor does a channel."""
-        of_pairs = np.random.default_rng(20).uniform(0.5, 1.5, (len(self.wi), 1))
-        return self.scale * of_pairs * np.geomspace(1, 4, dr.size_v(mi.UnpolarizedSpectrum))
-
-    def steep(self, cosine: float) -> Pairs:
-        """Return those whose directions are both that far from grazing."""
-        kept = np.minimum(abs(self.wi[:, 2]), abs(self.wo[:, 2])) > cosine
-        return Pairs(*(each[kept] for each in self))
 
 
 def gradients(run: Run) -> Findings:
@@ -74,7 +57,7 @@ def gradients(run: Run) -> Findings:
     if not run.probe.parts:
         return
     pairs, u = _drawn(run)
-    yield _directional(run, pairs if len(u) else None)
+    yield directional(run, pairs if len(u) else None)
     parameters, findings = traced_floats(run, "gradients", differentiable=True)
     yield from findings
     for each in parameters:
@@ -110,7 +93,7 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
     if found.trusted.mean() < 0.5:
         words = "Finite differences of two steps disagree: no derivative to tell."
         return outcome.finding("") if outcome.faults else Finding("gradients", parameter.key, "skip", words)
-    error, size = _judge(outcome, "its derivatives", compared, found, pairs)
+    error, size = compare_differences(outcome, "its derivatives", compared, found, pairs)
     agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
     return outcome.finding(f"Finite and equal to finite differences: {agreement}.")
 
@@ -118,7 +101,7 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
 def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs: Pairs) -> Array:
     """Check that derivatives are finite and the reverse ones those of forward differentiation, and return these for
     pairs as they are drawn."""
-    edges, where = _edges(run.probe.whole), " at grazing or normal incidence"
+    edges, where = edges_of(run.probe.whole), " at grazing or normal incidence"
     derivatives, reverse = _derivatives(run, parameter, pairs), _reverse(run, parameter, pairs)
     for name, values in (
         ("of its derivatives", derivatives),
@@ -130,31 +113,12 @@ def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs:
             outcome.fault(f"{1 - np.isfinite(values).mean():.1%} {name} are not finite", np.inf)
     if outcome.faults:
         return derivatives
-    direction, light = _direction(parameter), _light(run, pairs) / max(_size(parameter), 1)
-    if not _agree(derivatives, reverse @ direction, pairs, light):
+    direction, light = _direction(parameter), light_of(run, pairs) / max(_size(parameter), 1)
+    if not agree(derivatives, reverse @ direction, pairs, light):
         # Beyond a limit those vanish that lead further out, which are those of the negative sum.
         reverse = np.where(reverse == 0, -_reverse(run, parameter, pairs, -1), reverse)
-    _compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs, light)
+    compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs, light)
     return derivatives
-
-
-def _light(run: Run, pairs: Pairs) -> float:
-    """Return the weighted sum of the values."""
-    return float(np.nansum(pairs.weights * run.probe.eval(run.probe.whole, pairs.wi, pairs.wo)))
-
-
-def _agree(derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> bool:
-    """Return whether the reverse derivative of the weighted sum of values is that of the forward ones, but for rounding
-    of the ``light``."""
-    weighted = pairs.weights * derivatives
-    return bool(abs(reverse - weighted.sum()) <= max(TOLERANCE * abs(weighted).sum(), DARK * light))
-
-
-def _compare_reverse(outcome: Outcome, name: str, derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> None:
-    if not _agree(derivatives, reverse, pairs, light):
-        total = (pairs.weights * derivatives).sum()
-        told = f"of {name}, that of a weighted sum of values is {reverse:.4g} by dr.backward, but {total:.4g} by"
-        outcome.fault(f"{told} dr.forward", abs(reverse - total))
 
 
 def _direction(parameter: Parameter) -> Array:
@@ -186,7 +150,7 @@ def _reverse(run: Run, parameter: Parameter, pairs: Pairs, sign: int = 1) -> Arr
     reverse differentiation, in which other things go wrong."""
     attached, values = _attached(run, parameter, pairs)
     if dr.grad_enabled(values):
-        _backward(sign * values, pairs)
+        differentiate_sum(sign * values, pairs)
     return gradient(attached)
 
 
@@ -201,19 +165,6 @@ def _forward(attached: Any, direction: Any) -> None:
     dr.set_grad(attached, direction)
     dr.enqueue(dr.ADMode.Forward, attached)
     dr.traverse(dr.ADMode.Forward)
-
-
-def _backward(values: Any, pairs: Pairs) -> None:
-    """Differentiate the weighted sum of values."""
-    weights = mi.UnpolarizedSpectrum(np.float32(pairs.weights.T))
-    dr.backward(dr.sum(mi.unpolarized_spectrum(values) * weights, axis=None))
-
-
-def _edges(part: Part) -> Pairs:
-    """Return pairs of directions where formulas break: normal, grazing, mirrored, equal."""
-    edge = np.array([direction(t, phi) for t in (0, 1e-3, 45, 89, 89.9, 89.99) for phi in (0, 50, 180)])
-    edge = on_side(edge, part.sides[0])
-    return Pairs(np.repeat(edge, len(edge), axis=0), np.tile(edge, (len(edge), 1)), np.ones((len(edge) ** 2, 1)))
 
 
 # --- Beside finite differences --------------------------------------------------------------------------------------
@@ -269,22 +220,6 @@ def _turns(parameter: Parameter) -> bool:
             ways = [way for each in nested(bsdf.model.declared()) for way in each.spellings]
             return any(it.turns and it.name == name for way in ways for it in way)
     return False
-
-
-def _judge(outcome: Outcome, name: str, compared: Array, found: Differences, pairs: Pairs) -> tuple[float, float]:
-    """Add a fault if derivatives are off on average; return their error and their size."""
-    low, high, trusted, noise = found
-    scales = np.broadcast_to(pairs.scale, trusted.shape)[trusted]
-    ad, low, high, noise = (x[trusted] * scales for x in (np.nan_to_num(compared), low, high, noise))
-    fd = np.clip(ad, low, high)
-    error, size = float(abs(ad - fd).sum()), float(max(abs(fd).sum(), abs(ad).sum()))
-    if error > TOLERANCE * size + LOST * noise.sum():
-        k = np.nonzero(trusted)[0][int(np.argmax(abs(ad - fd)))]
-        sizes = f"those of eval average {abs(ad).mean():.3g} in size, finite differences {abs(fd).mean():.3g}"
-        told = f"{name} are off by {error / size:.0%}: {sizes}"
-        outcome.fault(told, error / size, wi=pairs.wi[k], wo=pairs.wo[k])
-    outcome.data = {"error": error, "size": size}
-    return error, size
 
 
 # --- What samplers and optimisers need ------------------------------------------------------------------------------
@@ -366,68 +301,3 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
     if max(0.3 * near, 1e-6 * len(pairs.wi)) < nearer < 3 * near:
         words = f"those of the sum of eval and of its negative are 0, but just inside the limit it is {nearer:.3g}"
         outcome.fault(f"{start} no derivative leads back: {words}", np.inf)
-
-
-# --- For the directions ---------------------------------------------------------------------------------------------
-
-
-def _directional(run: Run, pairs: Pairs | None) -> Finding:
-    """Check the derivatives of ``eval`` and ``pdf`` for the directions: they are finite, also where formulas break, and
-    those of ``eval`` are those of finite differences for some ``pairs``, if there are any."""
-    outcome, probe, part = Outcome("gradients", "wi and wo"), run.probe, run.probe.whole
-    wi, wo, _ = _edges(part)
-    some, others = (on_side(hemisphere(500, seed), part.sides[0]) for seed in (15, 16))
-    mirrored = wi * np.array([-1, -1, 1], np.float32)
-    wi, wo = np.concatenate([wi, wi, some, some]), np.concatenate([wo, mirrored, some, others])
-    for name, method in (("eval", probe.bsdf.eval), ("pdf", probe.bsdf.pdf)):
-        si, towards = interaction(wi), vectors(wo)
-        dr.enable_grad(si.wi, towards)
-        result = method(part.context, si, towards, True)
-        if not dr.grad_enabled(result):
-            continue
-        dr.backward(dr.sum(result, axis=None))
-        for word, derivative in (("wi", dr.grad(si.wi)), ("wo", dr.grad(towards))):
-            found = numbers(derivative, len(wi))
-            bad = np.logical_not(np.isfinite(found).all(axis=1))
-            why = f"as of {bad.mean():.1%} of the pairs tried"
-            outcome.wrong(bad, f"the derivative of {name} for {word}", found, why, wi, wo)
-    agreement = _compare_directional(run, outcome, pairs.steep(0.1)) if pairs else ""
-    return outcome.finding(f"The derivatives of eval and pdf for the directions are finite{agreement}.")
-
-
-def _compare_directional(run: Run, outcome: Outcome, pairs: Pairs) -> str:
-    """Compare derivatives of ``eval``, as both directions turn, to finite differences; return what to say of them."""
-    probe, part = run.probe, run.probe.whole
-    step = TURN * min(run.spread(part), 1)
-    if not len(pairs.wi) or step < 1e-5:
-        return ""
-    directions = np.array([pairs.wi, pairs.wo], np.float64)
-    axes = np.cross(directions, np.random.default_rng(19).normal(size=directions.shape))
-    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
-
-    def at(angle: float) -> Array:
-        return probe.eval(part, *(np.cos(angle) * directions + np.sin(angle) * axes).astype(np.float32))
-
-    if not abs(at(0) * pairs.scale).mean() > DARK:
-        return ""
-
-    def turned() -> tuple[mi.Float, Any]:
-        angle, si = mi.Float(0), interaction(pairs.wi)
-        dr.enable_grad(angle)
-        si.wi, towards = (vectors(w) + angle * vectors(axis) for w, axis in zip(directions, axes, strict=True))
-        return angle, probe.bsdf.eval(part.context, si, towards, True)
-
-    angle, result = turned()
-    if not dr.grad_enabled(result):
-        return ""
-    dr.forward(angle)
-    derivative = numbers(dr.grad(result), len(pairs.wi))
-    angle, result = turned()
-    _backward(result, pairs)
-    _compare_reverse(outcome, "the derivatives for wi and wo", derivative, dr.grad(angle)[0], pairs, _light(run, pairs))
-    found = differences(at, step)
-    found = found._replace(noise=found.noise + 1e-7 * abs(found.low) / step)
-    if found.trusted.mean() < 0.5:
-        return ""
-    error, size = _judge(outcome, "the derivatives for wi and wo", derivative, found, pairs)
-    return f", and eval's agree with finite differences to {error / max(size, 1e-12):.1g}"
