@@ -759,7 +759,7 @@ def test_fields_that_sample_leaves_empty_are_named():
 def test_what_raises_is_told_and_the_rest_is_checked():
     report = check(Mutant("raises", (), Raises).register(), only=["finite", "gradients", "recompiles", "flags"])
     assert [f.check for f in report.failures] == ["gradients"], report
-    assert report.failures[0].message.endswith("raised TypeError: no derivative.")
+    assert "raised TypeError: no derivative (test_validation.py, line " in report.failures[0].message
     assert report.verdict("flags") == report.verdict("recompiles") == report.verdict("finite") == "pass"
 
 

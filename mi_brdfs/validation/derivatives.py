@@ -114,6 +114,8 @@ def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs:
     if outcome.faults:
         return derivatives
     direction, light = _direction(parameter), light_of(run, pairs) / max(_size(parameter), 1)
+    if _turns(parameter):  # by directions that are rounded anew, to both sides of a narrow lobe
+        light *= max(1, 1e-7 / run.spread(run.probe.whole) ** 2 / DARK)
     if not agree(derivatives, reverse @ direction, pairs, light):
         # Beyond a limit those vanish that lead further out, which are those of the negative sum.
         reverse = np.where(reverse == 0, -_reverse(run, parameter, pairs, -1), reverse)
