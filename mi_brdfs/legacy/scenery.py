@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import mitsuba as mi
 import numpy as np
 
-from .document import Element, written
+from .document import Element, prop, written
 from .rules import rule
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _heterogeneous(work: Work, element: Element) -> None:
     density = element["sigma_t"] and work.resolved(element["sigma_t"])
     if density and density.type == "constvolume":
         element.type = "homogeneous"
-        element.set("sigma_t", density.number("value", 1))
+        element.set("sigma_t", float(np.mean((density["value"] or prop("value", 1.0)).numbers())))
         work.changed(element, "a heterogeneous medium of one density is homogeneous; the other is in a unit cube alone")
 
 
