@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from . import scenery  # noqa: F401, which fills RULES, as surfaces does
-from .document import Element, Reader, plugin, prop, rgb_of, root_of, written
+from .document import Element, Reader, floats, plugin, prop, rgb_of, root_of, written
 from .older import modernize
 from .rules import RULES
 from .surfaces import colours
@@ -104,6 +104,18 @@ def upgrade(path: str | os.PathLike, *, lenient: bool = False, folder: str | os.
         raise ValueError(f"{path}: version {version} is none of 0.2 to 0.6.")
     work = Work(path, lenient, Path(folder) if folder is not None else path.parent)
     return Upgraded(version, work.scene(root, int(found[1])).to_xml(), work.changes)
+
+
+def _complete_look_at(element: Element) -> None:
+    """Say which way is up where that is not given, as 0.6 finds it."""
+    given = [floats(element.attributes.get(name) or "0 0 0") for name in ("origin", "target", "up")]
+    origin, target, up = (np.array(it) for it in given)
+    if up.any() or not (target - origin).any():
+        return
+    x, y, z = towards = (target - origin) / np.linalg.norm(target - origin)
+    aside = (z, 0, -x) if abs(x) > abs(y) else (0, z, -y)
+    found = np.cross(aside, towards) / np.linalg.norm(aside)
+    element.attributes["up"] = written(found.tolist())
 
 
 def is_new(path: Path) -> bool:
@@ -213,6 +225,8 @@ class Work:
                 for kind, text in ((it.tag, it.value), *it.attributes.items()):
                     if kind in COUNTS and (text or COUNTS[kind]):
                         it.numbers(*COUNTS[kind], text=text)
+                if it.tag == "lookat":
+                    _complete_look_at(it)
             element.value = element.value.strip(", \t\n")
             if element.tag == "boolean":
                 element.value = element.value.lower()
