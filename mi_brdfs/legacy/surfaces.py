@@ -177,9 +177,7 @@ def _map(work: Work, element: Element) -> Element | None:
             element.children[element.children.index(texture)] = own
             work.changed(target, f"the bitmap of {element.type} is read as linear numbers")
             continue
-        if target.type == "bitmap" and target.text("raw") != "true" and work.values(target).shape[1] > 1:
-            told = "is decoded, as in 0.6; spectral variants of Mitsuba 3 take grey or raw ones only"
-            work.changed(target, f"the bitmap of {element.type} {told}")
+        work.tell_of_colours(target, element.type)
     return None
 
 

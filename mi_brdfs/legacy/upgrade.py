@@ -303,6 +303,8 @@ class Work:
                 for it in colours(child):
                     swapped.set({"color0": "color1", "color1": "color0"}[it.name], float(np.mean(it.numbers())))
                 element.put(swapped)
+            elif child.name in NUMBERS:
+                self.tell_of_colours(self.resolved(child), f"{child.name} of {element.type}")
 
     def _succeeded(self, element: Element) -> Element | None:
         """Return a plugin under its name in Mitsuba 3, or what is nearest to it."""
@@ -378,6 +380,12 @@ class Work:
     def is_grey(self, texture: Element) -> bool:
         """Return whether its channels are the same, but for the noise of compressed files."""
         return bool(np.ptp(self.values(texture), axis=1).max() < 0.02)
+
+    def tell_of_colours(self, texture: Element, what: str) -> None:
+        """Report a bitmap of colours that is read as numbers."""
+        if texture.type == "bitmap" and texture.text("raw") != "true" and self.values(texture).shape[1] > 1:
+            told = "is decoded, as in 0.6; spectral variants of Mitsuba 3 take grey or raw ones only"
+            self.changed(texture, f"the bitmap of {what} {told}")
 
     def values(self, texture: Element) -> np.ndarray:
         """Return what it is made of before it is scaled: constants or pixels, shape (n, 1) or (n, 3)."""
