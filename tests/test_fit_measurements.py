@@ -128,11 +128,13 @@ def test_tinted_models_have_all_derivatives():
     assert it.bsdf["spec_tint"] == pytest.approx(tint, rel=1e-2)
 
 
-def test_anisotropic_data_have_anisotropic_parameters():
+@pytest.mark.parametrize("given", [{}, {"alpha_u": 0.1}, {"alpha_u": "free", "alpha_v": 0.3}], ids=str)
+def test_anisotropic_data_have_anisotropic_parameters(given):
+    """Also if one of a pair is given."""
     wi, wo = pairs(3000, 4)
     f = ref.ward(*(ref.rotate(w, 0.1) for w in (wi, wo)), 0.2, 0.4, 0.1, 0.3, "balanced") / wo[:, 2]
     brushed = Measurement(Path("brushed"), "made", Samples(wi, wo, f[:, None], True), np.array([550.0]))
-    (it,) = fit(brushed, "ward", starts=6)
+    (it,) = fit(brushed, "ward", starts=6, given=given)
     u, v, turn = (it.bsdf[name] for name in ("alpha_u", "alpha_v", "rotation"))
     if u > v:  # the same lobe, a quarter of a turn on
         u, v, turn = v, u, turn + 0.25
