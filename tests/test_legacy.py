@@ -451,14 +451,21 @@ def test_materials_of_an_obj_are_named(folder, upgraded, bsdfs, said):
     assert said in new.report() and new.xml.count('type="diffuse"') == min(len(bsdfs), 1)
 
 
+TRIANGLE = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+
+
+def write_ply(path, properties, vertices, faces):
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}", *(f"property {it}" for it in properties)]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [" ".join(map(str, it)) for it in (*vertices, *([3, *face] for face in faces))]
+    path.write_text("\n".join([*lines, ""]))
+
+
 @pytest.mark.parametrize("kind, value, linear", [("uchar", 255, True), ("uchar", 51, False), ("float", 0.2, True)])
 def test_colours_of_vertices(load, folder, kind, value, linear):
     """Bytes are parts of 255; colours in sRGB are not decoded, and the report says so."""
-    header = ["ply", "format ascii 1.0", "element vertex 3", *(f"property float {axis}" for axis in "xyz")]
-    header += [*(f"property {kind} {name}" for name in ("red", "green", "blue")), "element face 1"]
-    header += ["property list uchar int vertex_indices", "end_header"]
-    vertices = [f"{at} {value} {value} {value}" for at in ("-1 -1 0", "1 -1 0", "0 1 0")]
-    (folder / "painted.ply").write_text("\n".join([*header, *vertices, "3 0 1 2", ""]))
+    properties = [*(f"float {axis}" for axis in "xyz"), *(f"{kind} {name}" for name in ("red", "green", "blue"))]
+    write_ply(folder / "painted.ply", properties, [[*at, *[value] * 3] for at in TRIANGLE], [[0, 1, 2]])
     srgb = '<boolean name="srgb" value="false"/>' * linear
     scene, warning = load(
         f'<shape type="ply"><string name="filename" value="painted.ply"/>{srgb}<bsdf type="twosided">'
@@ -484,11 +491,8 @@ def octahedron(path, normals):
         )
         path.write_bytes(mesh + struct.pack("<QI", 0, 1))
         return
-    names = [*"xyz", "nx", "ny", "nz"][: 3 * (1 + normals)]
-    header = ["ply", "format ascii 1.0", f"element vertex {len(OCTAHEDRON)}", *(f"property float {it}" for it in names)]
-    header += [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header"]
-    lines = [" ".join(map(str, [*it] * (1 + normals))) for it in OCTAHEDRON.tolist()]
-    path.write_text("\n".join([*header, *lines, *(f"3 {a} {b} {c}" for a, b, c in FACES.tolist()), ""]))
+    properties = [f"float {name}" for name in (*"xyz", "nx", "ny", "nz")][: 3 * (1 + normals)]
+    write_ply(path, properties, [it * (1 + normals) for it in OCTAHEDRON.tolist()], FACES.tolist())
 
 
 @pytest.mark.usefixtures("llvm_rgb")

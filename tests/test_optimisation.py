@@ -299,7 +299,6 @@ def test_derivatives_for_the_extinction(eta, k):
     expected = (fresnel_conductor(cos, eta, k + step) - fresnel_conductor(cos, eta, k)) / step
     counts = (expected < -0.01) if k == 0 else np.ones(len(cos), bool)
     assert counts.any() or eta > 1
-    np.testing.assert_allclose(
-        np.array(dr.grad(found))[counts], expected[counts], rtol=2e-3, atol=1e-4
-    )  # of terms near 1
+    # The derivatives of terms near 1 cancel.
+    np.testing.assert_allclose(np.array(dr.grad(found))[counts], expected[counts], rtol=2e-3, atol=1e-4)
     np.testing.assert_allclose(np.array(found), fresnel_conductor(cos, eta, k), atol=1e-6)

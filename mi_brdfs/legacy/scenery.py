@@ -96,14 +96,16 @@ def _round(work: Work, element: Element) -> None:
 def _mirrored(work: Work, element: Element) -> None:
     """Keep the inside of a mirrored shape inside: 0.6 turns the faces of serialized meshes, and finds the exterior
     medium on that side of a face on which its vertex normals are."""
-    transform = element["to_world"]
-    if not transform or np.linalg.det(_matrix(transform)[:3, :3]) >= 0:
+    transform, others = element["to_world"], {"interior": "exterior", "exterior": "interior"}
+    media = [it for it in element.children if it.name in others]
+    if not transform or not (media or element.type == "serialized"):
+        return
+    if np.linalg.det(_matrix(transform)[:3, :3]) >= 0:
         return
     if element.text("face_normals") != "true" and _has_vertex_normals(work, element):
-        for it in element.children:
-            if other := {"interior": "exterior", "exterior": "interior"}.get(it.name):
-                it.name = other
-                work.changed(element, f"the {other} of a mirrored {element.type} was the other one")
+        for it in media:
+            it.name = others[it.name]
+            work.changed(element, f"the {it.name} of a mirrored {element.type} was the other one")
     elif element.type == "serialized":
         element.set("flip_normals", element.text("flip_normals") != "true")
         work.changed(element, "a mirrored serialized mesh has flip_normals")

@@ -20,10 +20,9 @@ from .pairs import (
     DARK,
     TOLERANCE,
     Pairs,
-    agree,
     compare_differences,
-    compare_reverse,
     differentiate_sum,
+    disagreement,
     edges_of,
     light_of,
 )
@@ -116,13 +115,11 @@ def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs:
     direction, light = _direction(parameter), light_of(run, pairs) / max(_size(parameter), 1)
     if _turns(parameter):  # by directions that are rounded anew, to both sides of a narrow lobe
         light *= max(1, 1e-7 / run.spread(run.probe.whole) ** 2 / DARK)
+    told, off = disagreement("its derivatives", derivatives, reverse @ direction, pairs, light)
     # Beyond limits, also of what is made of a parameter, those vanish that lead further out: others are those of the
     # negative sum, and neither need be the forward ones.
-    judged = agree(derivatives, reverse @ direction, pairs, light) or np.allclose(
-        reverse, -_reverse(run, parameter, pairs, -1), 1e-3
-    )
-    if judged:
-        compare_reverse(outcome, "its derivatives", derivatives, reverse @ direction, pairs, light)
+    if told and np.allclose(reverse, -_reverse(run, parameter, pairs, -1), 1e-3):
+        outcome.fault(told, off)
     return derivatives
 
 

@@ -12,7 +12,7 @@ from ..probe.arrays import Array, interaction, numbers, vectors
 from ..probe.directions import hemisphere, on_side
 from .differences import differences
 from .outcome import Outcome
-from .pairs import DARK, Pairs, compare_differences, compare_reverse, differentiate_sum, edges_of, light_of
+from .pairs import DARK, Pairs, compare_differences, differentiate_sum, disagreement, edges_of, light_of
 from .report import Finding
 from .run import Run
 
@@ -73,12 +73,13 @@ def _compare_directional(run: Run, outcome: Outcome, pairs: Pairs) -> str:
     derivative = numbers(dr.grad(result), len(pairs.wi))
     angle, result = turned()
     differentiate_sum(result, pairs)
-    compare_reverse(
-        outcome, "the derivatives for wi and wo", derivative, dr.grad(angle)[0], pairs, light_of(run, pairs)
-    )
+    name = "the derivatives for wi and wo"
+    told, off = disagreement(name, derivative, dr.grad(angle)[0], pairs, light_of(run, pairs))
+    if told:
+        outcome.fault(told, off)
     found = differences(at, step)
     found = found._replace(noise=found.noise + 1e-7 * abs(found.low) / step)
     if found.trusted.mean() < 0.5:
         return ""
-    error, size = compare_differences(outcome, "the derivatives for wi and wo", derivative, found, pairs)
+    error, size = compare_differences(outcome, name, derivative, found, pairs)
     return f", and eval's agree with finite differences to {error / max(size, 1e-12):.1g}"

@@ -60,19 +60,15 @@ def light_of(run: Run, pairs: Pairs) -> float:
     return float(np.nansum(pairs.weights * run.probe.eval(run.probe.whole, pairs.wi, pairs.wo)))
 
 
-def agree(derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> bool:
-    """Return whether the reverse derivative of the weighted sum of values is that of the forward ones, but for rounding
-    of the ``light``."""
+def disagreement(name: str, derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> tuple[str, float]:
+    """Return what to say if the reverse derivative of the weighted sum of values is not that of the forward ones, but
+    for rounding of the ``light``, and by how much it is off; nothing if it is."""
     weighted = pairs.weights * derivatives
-    return bool(abs(reverse - weighted.sum()) <= max(TOLERANCE * abs(weighted).sum(), DARK * light))
-
-
-def compare_reverse(outcome: Outcome, name: str, derivatives: Array, reverse: Any, pairs: Pairs, light: float) -> None:
-    """Add a fault if they do not agree."""
-    if not agree(derivatives, reverse, pairs, light):
-        total = (pairs.weights * derivatives).sum()
-        told = f"of {name}, that of a weighted sum of values is {reverse:.4g} by dr.backward, but {total:.4g} by"
-        outcome.fault(f"{told} dr.forward", abs(reverse - total))
+    total, error = weighted.sum(), abs(reverse - weighted.sum())
+    if error <= max(TOLERANCE * abs(weighted).sum(), DARK * light):
+        return "", 0
+    told = f"of {name}, that of a weighted sum of values is {reverse:.4g} by dr.backward, but {total:.4g} by dr.forward"
+    return told, float(error)
 
 
 def compare_differences(
