@@ -92,7 +92,12 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
     if found.trusted.mean() < 0.5:
         words = "Finite differences of two steps disagree: no derivative to tell."
         return outcome.finding("") if outcome.faults else Finding("gradients", parameter.key, "skip", words)
+    right = not outcome.faults
     error, size = compare_differences(outcome, "its derivatives", compared, found, pairs)
+    parameter.set(original)
+    if right and outcome.faults and _led_back(run, parameter, pairs, _reverse(run, parameter, pairs)):
+        words = "What is made of it is at a limit within the plugin, and its derivatives lead back from there."
+        return Finding("gradients", parameter.key, "skip", words)
     agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
     return outcome.finding(f"Finite and equal to finite differences: {agreement}.")
 
@@ -116,11 +121,15 @@ def _finite_derivatives(run: Run, outcome: Outcome, parameter: Parameter, pairs:
     if _turns(parameter):  # by directions that are rounded anew, to both sides of a narrow lobe
         light *= max(1, 1e-7 / run.spread(run.probe.whole) ** 2 / DARK)
     told, off = disagreement("its derivatives", derivatives, reverse @ direction, pairs, light)
-    # Beyond limits, also of what is made of a parameter, those vanish that lead further out: others are those of the
-    # negative sum, and neither need be the forward ones.
-    if told and np.allclose(reverse, -_reverse(run, parameter, pairs, -1), 1e-3):
+    if told and not _led_back(run, parameter, pairs, reverse):
         outcome.fault(told, off)
     return derivatives
+
+
+def _led_back(run: Run, parameter: Parameter, pairs: Pairs, reverse: Array) -> bool:
+    """Return whether what is made of a parameter is beyond a limit within its plugin: reverse derivatives that lead
+    further out vanish there, others are those of the negative sum, and neither need be the forward ones."""
+    return not np.allclose(reverse, -_reverse(run, parameter, pairs, -1), 1e-3)
 
 
 def _direction(parameter: Parameter) -> Array:
@@ -298,8 +307,12 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
         outcome.fault(f"{start} a step against its derivative leads away", outwards)
     if any(found.any() for found in ways):
         return
+    near, nearer = (backward(limit - 0.1 * share * step) for share in (0.1, 0.001))
+    # Where another limit holds, the parameter has no influence.
+    if (near[0] == at_limit).all():
+        return
     # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump.
-    near, nearer = (abs(backward(limit - 0.1 * share * step)[1][0]).sum() for share in (0.1, 0.001))
-    if max(0.3 * near, 1e-6 * len(pairs.wi)) < nearer < 3 * near:
-        words = f"those of the sum of eval and of its negative are 0, but just inside the limit it is {nearer:.3g}"
+    inside, last = (abs(found).sum() for _, (found,) in (near, nearer))
+    if max(0.3 * inside, 1e-6 * len(pairs.wi)) < last < 3 * inside:
+        words = f"those of the sum of eval and of its negative are 0, but just inside the limit it is {last:.3g}"
         outcome.fault(f"{start} no derivative leads back: {words}", np.inf)
