@@ -65,16 +65,11 @@ def medians(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
     return {name: median(own) for name, own in times.items()}
 
 
-def line(sizes: Iterable[float], seconds: Iterable[float]) -> tuple[float, float, float]:
-    """Return ``(fixed, slope, deviation)`` of the line with the least relative deviations, and the largest of these."""
-    x, y = np.array(list(sizes), float), np.array(list(seconds))
-    fixed, slope = np.linalg.lstsq(np.stack([1 / y, x / y], axis=-1), np.ones(len(x)), rcond=None)[0]
-    return float(fixed), float(slope), float(np.abs((fixed + slope * x) / y - 1).max())
-
-
 def report(what: str, found: dict[int, float]) -> None:
-    """Print times by size with the line through them, and the largest deviation from it."""
-    fixed, slope, deviation = line(found, found.values())
+    """Print times by size with the line of the least relative deviations, and the largest of these."""
+    x, y = np.array([*found]), np.array([*found.values()])
+    slope, fixed = np.polyfit(x, y, 1, w=1 / y)
+    deviation = np.abs((fixed + slope * x) / y - 1).max()
     cells = ", ".join(f"{size}: {seconds * 1e3:.1f}" for size, seconds in found.items())
     formula = f"{fixed * 1e3:.1f} ms + {slope * 1e6:.3g} µs each, within {deviation:.0%}"
     print(f"{what}  {cells} ms; about {formula}", flush=True)

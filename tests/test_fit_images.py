@@ -47,9 +47,10 @@ def picture_of(scene, sensor=0, spp=1024):
     return np.array(mi.render(scene, sensor=sensor, spp=spp, seed=1000))
 
 
-def fitted(start, hidden, *sought, spp=1024, **options):
+def fitted(start, hidden, *sought, spp=1024, samples=None, **options):
     """Fit a material to a picture of another one."""
-    return images(scene_of(start, **options), picture_of(scene_of(hidden, **options), spp=spp), sought or None)
+    picture = picture_of(scene_of(hidden, **options), spp=spp)
+    return images(scene_of(start, **options), picture, sought or None, spp=samples)
 
 
 def lamps(sky=None, **lamps):
@@ -84,7 +85,9 @@ def test_an_anisotropic_highlight(start):
 
 @pytest.mark.parametrize("start", [0.0, 1.0])
 def test_a_share_that_starts_at_an_end(start):
-    found = fitted({"type": "lambert", "reflectance": start}, {"type": "lambert", "reflectance": 0.5}, spp=64)
+    found = fitted(
+        {"type": "lambert", "reflectance": start}, {"type": "lambert", "reflectance": 0.5}, spp=64, samples=64
+    )
     assert found.converged and values(found)["reflectance"] == pytest.approx(0.5, abs=5e-3)
 
 
@@ -95,7 +98,8 @@ def test_alpha_is_no_colour():
     assert picture.shape[2] == 4 and picture[0, 0, 3] == 1
     grey = {"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}
     first, second = (
-        images(scene_of(grey, integrator="path", pixel_format="rgba"), given) for given in (picture, picture[..., :3])
+        images(scene_of(grey, integrator="path", pixel_format="rgba"), given, spp=64)
+        for given in (picture, picture[..., :3])
     )
     assert values(first)["reflectance"] == pytest.approx([0.2, 0.5, 0.8], abs=2e-3)
     assert first.losses == pytest.approx(second.losses, rel=1e-3)
@@ -107,7 +111,7 @@ def test_bitmaps_are_in_the_colours_of_the_film():
     scene = scene_of(lambert, pixel_format="xyz")
     array = picture_of(scene, spp=64)
     for given in (array, scene.sensors()[0].film().bitmap(), mi.Bitmap(picture_of(scene_of(lambert), spp=64))):
-        found = images(scene_of(grey, pixel_format="xyz"), given)
+        found = images(scene_of(grey, pixel_format="xyz"), given, spp=64)
         assert values(found)["reflectance"] == pytest.approx([0.2, 0.5, 0.8], abs=5e-3)
 
 
@@ -136,7 +140,7 @@ def test_a_texture_that_the_scene_holds(tmp_path):
     params[key] = mi.TensorXf(np.full((2, 2, 1), 0.4, np.float32))
     dr.enable_grad(params["ball.exponent.value"])
     params.update()
-    found = images(scene, picture, key, iterations=5)
+    found = images(scene, picture, key, iterations=5, spp=64)
     np.testing.assert_allclose(found.values[key], 0.2, atol=0.02)
     assert found.bsdfs["ball"]["type"] == "phong"
 
@@ -150,9 +154,9 @@ def test_derivatives_of_another_scene():
     picture = mi.render(other, params, spp=4)
     scene = scene_of({"type": "ward", "alpha": 0.5}, size=8)
     with pytest.raises(FitError, match=r"call dr\.disable_grad for that parameter, or dr\.backward for that picture"):
-        images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1)
+        images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1, spp=4)
     dr.disable_grad(params["ball.bsdf.alpha.value"])
-    assert images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1).values
+    assert images(scene, np.array(picture), "ball.bsdf.alpha", iterations=1, spp=4).values
 
 
 @pytest.mark.slow
@@ -189,7 +193,7 @@ def test_volumetric_integrators():
     lambert = {"type": "lambert", "reflectance": 0.5}
     picture = picture_of(scene_of(lambert), spp=64)
     for integrator in ("volpath", "prbvolpath"):
-        found = images(scene_of({"type": "lambert", "reflectance": 0.2}, integrator=integrator), picture)
+        found = images(scene_of({"type": "lambert", "reflectance": 0.2}, integrator=integrator), picture, spp=64)
         assert values(found)["reflectance"] == pytest.approx(0.5, abs=5e-3)
     fog = {"type": "sphere", "interior": {"type": "homogeneous"}}
     with pytest.raises(FitError, match="Scenes with media cannot be fitted"):
@@ -203,7 +207,7 @@ def test_local_illumination():
     hidden, start = (
         {"type": "phong", "diffuse_reflectance": rho, "exponent": n} for rho, n in ((0.2, 20.0), (0.5, 40.0))
     )
-    found = fitted(start, hidden, spp=1, integrator=shading, lights=lamp)
+    found = fitted(start, hidden, spp=1, samples=1, integrator=shading, lights=lamp)
     assert found.converged and values(found)["diffuse_reflectance"] == pytest.approx(0.2, abs=1e-3)
     assert values(found)["exponent"] == pytest.approx(20, rel=1e-2)
     with pytest.raises(FitError, match="give it clamp = false"):
@@ -373,13 +377,6 @@ def test_an_interrupt_leaves_the_scene_as_it_was():
     assert scene.sensors()[0].sampler().sample_count() == 4
 
 
-def test_a_file_of_linear_values(tmp_path):
-    bsdf = {"type": "lambert", "reflectance": rgb(0.6, 0.3, 0.1)}
-    mi.Bitmap(picture_of(scene_of(bsdf)).astype(np.float32)).write(str(tmp_path / "picture.exr"))
-    found = images(scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}), tmp_path / "picture.exr")
-    assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=0.01)
-
-
 def test_pixels_that_were_clipped_do_not_count(tmp_path):
     """A lamp so strong that a part of the picture is white in 8 bits of sRGB; the others have the values behind it."""
     lamp = lamps(key=([-1, 2, 5], 250.0))
@@ -388,4 +385,5 @@ def test_pixels_that_were_clipped_do_not_count(tmp_path):
     mi.util.write_bitmap(str(tmp_path / "picture.png"), picture, write_async=False)
     assert 0.1 < (np.array(mi.Bitmap(str(tmp_path / "picture.png")))[..., 0] == 255).mean() < 0.7
     start = scene_of({"type": "lambert", "reflectance": rgb(0.5, 0.5, 0.5)}, lights=lamp)
-    assert values(images(start, tmp_path / "picture.png"))["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=0.02)
+    found = images(start, tmp_path / "picture.png", spp=64)
+    assert values(found)["reflectance"] == pytest.approx([0.6, 0.3, 0.1], rel=0.02)

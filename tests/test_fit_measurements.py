@@ -1,9 +1,11 @@
 """Fits of files and arrays: weights, metrics, starts, what is told, and what is refused."""
 
 import json
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import fit_cost
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -161,18 +163,6 @@ def test_a_nap_is_turned_by_more_than_a_quarter():
     (it,) = fit(Measurement(Path("nap"), "made", Samples(wi, wo, f, True), np.array([550.0])), "nap", starts=4)
     assert it.bsdf["reflectance"] == pytest.approx(0.4, rel=1e-4)
     assert it.bsdf["rotation"] == pytest.approx(-0.4, abs=1e-4)
-
-
-@pytest.mark.slow
-def test_choices_and_several_models_are_ranked():
-    data = measured("ward", WARD, 1000)
-    found = fit(data, "ward", given={"variant": ("ward", "balanced")}, starts=2)
-    assert [it.bsdf["variant"] for it in found] == ["balanced", "ward"]
-    assert [it.model for it in found] == ["ward", "ward variant=ward"]
-    several = fit([data, LOFT], ["lambert", "ward"], starts=2)
-    assert [it.file for it in several] == ["arrays"] * 2 + [str(LOFT)] * 2
-    assert several[0].model == "ward" and several[0].held_out < several[1].held_out
-    assert several[0].bic < several[1].bic
 
 
 @pytest.mark.slow
@@ -335,6 +325,13 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
         fit(sources[data], model, **options)
     text = str(caught.value)
     assert sentence in text and "\n" not in text
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the memory that a process holds is read from /proc")
+def test_repeated_fits_hold_no_more_memory():
+    resident = [held for held, _ in fit_cost.memory(["lambert", "low"], repeats=12)]
+    assert max(resident[6:]) - min(resident[6:]) < 4
 
 
 @pytest.mark.slow

@@ -218,16 +218,14 @@ def test_calls_can_be_frozen(llvm_rgb, glossy):
 # --- Sampling -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["Zemax, anisotropic", "RGL"])
-def test_sampling_real_files_passes_the_checks(llvm_rgb, kind):
-    report = check({"type": "tabulated", "filename": str(REAL[kind]())}, only=JUDGED)
-    assert not report.failures, report
+SAMPLED = [0.3, *(pytest.param(it, marks=pytest.mark.slow) for it in (0.03, "Zemax, anisotropic", "RGL"))]
+"""Metals by their roughness, and real files."""
 
 
-@pytest.mark.parametrize("alpha", [pytest.param(0.03, marks=pytest.mark.slow), 0.3])
-def test_sampling_and_density_pass_the_checks(llvm_rgb, tmp_path, alpha):
-    file = write_merl(tmp_path / "metal.binary", lambda h, d, p: ggx(h, d, alpha))
+@pytest.mark.parametrize("of", SAMPLED)
+def test_sampling_and_density_pass_the_checks(llvm_rgb, tmp_path, of):
+    made = tmp_path / "metal.binary"
+    file = REAL[of]() if of in REAL else write_merl(made, lambda h, d, p: ggx(h, d, of))
     report = check({"type": "tabulated", "filename": str(file)}, only=JUDGED)
     assert not report.failures, report
 

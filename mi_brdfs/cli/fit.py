@@ -117,13 +117,12 @@ def fit_(
         for stem in {_id(file, it.plugins[0]) for file in files for it in models}:
             for path in {save / f"{stem}.xml", *save.glob(f"{stem}_*.xml")}:  # also with choices
                 check_output("--save", path, mark=f' id="{path.stem}" type=')
-    names = [it.plugins[0] for it in models]
     fits: list[Fit] = []
     complete, seen, failed = True, True, 0
     with stdout_to_stderr():
         try:
             materials, failed = _read(files, quantity, cut, seed)
-            failed += _fit_all(materials, names, metric, starts, seed, given, fits)
+            failed += _fit_all(materials, models, metric, starts, seed, given, fits)
         except KeyboardInterrupt:
             complete = False
         by_file = groupby(sorted(fits, key=lambda it: it.file), key=lambda it: it.file)
@@ -133,12 +132,12 @@ def fit_(
             ranked, seen = _look(ranked, sections if report else None, image, complete)
     for own in ranked:
         print_ranking(own)
-    if len(ranked) > 1 and len(names) > 1:
+    if len(ranked) > 1 and len(models) > 1:
         print_medians(ranked)
     if fits:
         write_json(json_file, [it.to_dict() for own in ranked for it in own])
     finished = len({(it.file, it.bsdf["type"]) for it in fits})
-    interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(names)} fits were finished."
+    interrupted = "" if complete else f"Interrupted; {finished} of {len(files) * len(models)} fits were finished."
     if complete and not seen:
         interrupted = "Interrupted; not all pictures were made."
     if report and ranked:
@@ -192,7 +191,7 @@ def _read(files: list[Path], quantity: Any, cut: float, seed: int) -> tuple[list
 
 def _fit_all(
     materials: list[Observations],
-    names: list[str],
+    models: list[type[Model]],
     metric: str,
     starts: int,
     seed: int,
@@ -206,18 +205,17 @@ def _fit_all(
     batches = [materials[k : k + TOGETHER] for k in range(0, len(materials), TOGETHER)]
     failed = set()
     with progress("Fitting", TaskProgressColumn()) as bar:
-        task = bar.add_task("", total=len(materials) * len(names))
+        task = bar.add_task("", total=len(materials) * len(models))
         for batch in batches:
-            for name in names:
-                done = bar.tasks[0].completed
+            for model in models:
+                name, done = model.plugins[0], bar.tasks[0].completed
 
                 def advance(ended: int, total: int, done: float = done, count: int = len(batch)) -> None:
                     bar.update(task, completed=done + count * ended / total)
 
                 bar.update(task, description=name)
                 try:
-                    (each,) = find_models([name])
-                    own = {key: value for key, value in given.items() if key in known_names(each)}
+                    own = {key: value for key, value in given.items() if key in known_names(model)}
                     with unwrapped_ctrl_c():
                         found = fit(batch, name, metric=metric, given=own, starts=starts, seed=seed, progress=advance)
                         for it in found:

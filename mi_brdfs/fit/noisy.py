@@ -50,8 +50,19 @@ class Look(NamedTuple):
 
     @property
     def matrix(self) -> Array:
-        """JᵀJ"""
-        return _matrix(*self.jacobians)
+        """JᵀJ of two noisy J, whose products have the square of no noise. Where it is much less than that of their
+        mean, or negative, it is a small part of this."""
+        one, other = self.jacobians
+        cross = one.T @ other
+        cross = (cross + cross.T) / 2
+        mean = self.jacobian
+        whole = mean.T @ mean
+        scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
+        lengths, axes = np.linalg.eigh(whole / np.outer(scale, scale))
+        roots = np.sqrt(np.maximum(lengths, 1e-12 * lengths.max()))
+        parts, directions = np.linalg.eigh((axes / roots).T @ (cross / np.outer(scale, scale)) @ (axes / roots))
+        kept = (axes * roots) @ directions
+        return np.asarray((kept * np.clip(parts, LEAST, 1)) @ kept.T * np.outer(scale, scale))
 
     @property
     def cost(self) -> float:
@@ -153,21 +164,6 @@ def _together(looks: Sequence[Look]) -> Look:
 def _means(pairs: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     first, second = zip(*pairs, strict=True)
     return np.mean(first, axis=0), np.mean(second, axis=0)
-
-
-def _matrix(one: Array, other: Array) -> Array:
-    """Return JᵀJ of two noisy J, whose products have the square of no noise. Where it is much less than that of their
-    mean, or negative, it is a small part of this."""
-    cross = one.T @ other
-    cross = (cross + cross.T) / 2
-    mean = (one + other) / 2
-    whole = mean.T @ mean
-    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    lengths, axes = np.linalg.eigh(whole / np.outer(scale, scale))
-    roots = np.sqrt(np.maximum(lengths, 1e-12 * lengths.max()))
-    parts, directions = np.linalg.eigh((axes / roots).T @ (cross / np.outer(scale, scale)) @ (axes / roots))
-    kept = (axes * roots) @ directions
-    return np.asarray((kept * np.clip(parts, LEAST, 1)) @ kept.T * np.outer(scale, scale))
 
 
 def refine_textures(rendered: Rendered, point: Array, steps: int, on_step: Callable[[], None]) -> Array:
