@@ -37,8 +37,19 @@ class Model:
         return {name: float(rng.uniform(*(RANGES | self.ranges)[name])) for name in self.parameters}
 
 
-def _schlick(f0):
-    return partial(ref.fresnel_schlick, f0=f0)
+def _schlick(function, **words):
+    """A reference by f0, the reflectance at normal incidence."""
+    return lambda wi, wo, f0, **values: function(wi, wo, fresnel=partial(ref.fresnel_schlick, f0=f0), **words, **values)
+
+
+def _isotropic(function, name="alpha", **words):
+    """A reference by one value for both tangent directions."""
+
+    def reference(wi, wo, **values):
+        along = values.pop(name)
+        return function(wi, wo, **{f"{name}_u": along, f"{name}_v": along}, **words, **values)
+
+    return reference
 
 
 TWO = "diffuse_reflectance", "specular_reflectance"
@@ -67,15 +78,9 @@ MODELS = {
         partial(ref.blinnphong, normalization="energy"), (*TWO, "exponent"), ranges={"exponent": (20, 200)}
     ),
     "cooktorrance": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, alpha, f0: ref.cooktorrance(
-            wi, wo, diffuse_reflectance, specular_reflectance, alpha, "beckmann", "modern", _schlick(f0)),
-        (*TWO, "alpha", "f0"),
+        _schlick(ref.cooktorrance, distribution="beckmann", normalization="modern"), (*TWO, "alpha", "f0")
     ),
-    "ward": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, alpha: ref.ward(
-            wi, wo, diffuse_reflectance, specular_reflectance, alpha, alpha, "balanced"),
-        (*TWO, "alpha"),
-    ),
+    "ward": Model(_isotropic(ref.ward, variant="balanced"), (*TWO, "alpha")),
     "schlick": Model(
         partial(ref.schlick, isotropy=1, variant="shadowed"), (*TWO, "roughness"), ranges={"roughness": (0.02, 0.2)}
     ),
@@ -86,26 +91,16 @@ MODELS = {
         (*TWO, "cx", "exponent"), given={"cz": 1.0}, ranges={"exponent": (10, 80)},
     ),
     "ashikhminshirley": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, exponent: ref.ashikhminshirley(
-            wi, wo, diffuse_reflectance, specular_reflectance, exponent, exponent),
-        (*TWO, "exponent"), ranges={"exponent": (20, 200)},
+        _isotropic(ref.ashikhminshirley, "exponent"), (*TWO, "exponent"), ranges={"exponent": (20, 200)}
     ),
-    "walter": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, alpha, f0: ref.walter(
-            wi, wo, diffuse_reflectance, specular_reflectance, alpha, alpha, "separable", _schlick(f0)),
-        (*TWO, "alpha", "f0"),
-    ),
+    "walter": Model(_isotropic(_schlick(ref.walter, shadowing="separable")), (*TWO, "alpha", "f0")),
     "kurt": Model(
         lambda wi, wo, diffuse_reflectance, specular_reflectance, f0, alpha, kurt_exponent: ref.kurt(
             wi, wo, diffuse_reflectance, [{"specular_reflectance": specular_reflectance, "f0": f0, "alpha_u": alpha,
                                            "alpha_v": alpha, "kurt_exponent": kurt_exponent}]),
         (*TWO, "f0", "alpha", "kurt_exponent"),
     ),
-    "nishino": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, kappa, gamma, f0: ref.nishino(
-            wi, wo, diffuse_reflectance, specular_reflectance, kappa, gamma, "microfacet", _schlick(f0)),
-        (*TWO, "kappa", "gamma", "f0"),
-    ),
+    "nishino": Model(_schlick(ref.nishino, variant="microfacet"), (*TWO, "kappa", "gamma", "f0")),
     "low": Model(
         partial(ref.low, variant="microfacet"), ("diffuse_reflectance", "a", "b", "c", "int_ior"),
     ),
@@ -124,10 +119,7 @@ MODELS = {
         partial(ref.metallicroughness, shadowing="direct"), ("base_color", "metallic", "roughness")
     ),
     "microfacet": Model(
-        lambda wi, wo, diffuse_reflectance, specular_reflectance, alpha, f0: ref.microfacet(
-            wi, wo, diffuse_reflectance, specular_reflectance, "beckmann", "smith", _schlick(f0), alpha_u=alpha,
-            alpha_v=alpha),
-        (*TWO, "alpha", "f0"),
+        _isotropic(_schlick(ref.microfacet, distribution="beckmann", shadowing="smith")), (*TWO, "alpha", "f0")
     ),
 }  # fmt: skip
 """By plugin, isotropic and with the default choices."""
