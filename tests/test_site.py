@@ -93,7 +93,7 @@ def test_the_front_page_leads_to_pages_of_the_explorer(site):
         assert '<h1><a href="index.html"' in text
         assert page.name in front and len(text) < 1.5e6 and '"scrubbers": [{"name": "theta"' in text
         values, start = re.search(r'"theta", "values": \[(.*?)\], "start": (\d+)', text).groups()
-        assert float(values.split(", ")[int(start)]) == live.OPENED[name]
+        assert float(values.split(", ")[int(start)]) == live.PAGES[name][1]
         assert ('"name": "fitted walter"' in text) == (name == "measured_paint") and '"name": "fit.json' not in text
 
 
