@@ -250,8 +250,8 @@ def test_an_uploaded_file_of_any_name_is_a_subject(address):
 
     async def conversation(page, hello, client):
         for _, answer in answers:
-            await page.send({"type": "tabulated", "file": answer["file"]}, views=["picture", "polar"])
-            found = await page.until("subject", "picture", "polar")
+            await page.send({"type": "tabulated", "file": answer["file"]}, views=["polar"])
+            found = await page.until("subject", "polar")
             assert found["subject"]["error"] is None
 
     connected(address, conversation)
@@ -487,6 +487,7 @@ def test_the_page_shows_what_it_was_started_with(tab, address):
     tab.wait_for_function(f"() => {shown} === '{light}'")
     tab.locator("#theme").click()
     tab.wait_for_function(f"() => {shown} === '{dark}'")
+    assert tab.locator("#compare").input_value() == "side"
     tab.locator("#compare").select_option("wipe")
     divider = tab.get_by_role("slider", name="Divider")
     divider.focus()

@@ -207,7 +207,7 @@ def _export(
         state = parse(data, scenes.names, scenes.shapes)
         with progress("Drawing") as bar:
             combinations = math.prod(len(values) for name, values in varied.items() if name != "theta")
-            task = bar.add_task("", total=len(sources) * combinations)
+            task = bar.add_task("", total=len(state.subjects) * combinations)
             materials = Materials({it.word: it for it in sources})
             text = page(state, materials, scenes, data, varied, lambda: bar.advance(task))
     write_text(file, text)
