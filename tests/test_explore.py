@@ -18,7 +18,7 @@ from latency import edited
 from support import LOFT as FILE
 from support import ROOT
 
-from mi_brdfs.explorer.export import CLIENT, index, page
+from mi_brdfs.explorer.export import CLIENT, page
 from mi_brdfs.explorer.materials import BUILT_IN, Materials, kinds
 from mi_brdfs.explorer.session import Session
 from mi_brdfs.explorer.stages import Pose, Progress, Setting, Stages, UserScene, rgba
@@ -37,18 +37,16 @@ class Client:
     """A page in this thread: its states are worked off at once."""
 
     def __init__(self, user=None, sources=()):
-        self.scenes, self.frames = Stages(user or UserScene()), []
+        self.scenes, self.frames, self.unread = Stages(user or UserScene()), [], []
         self.scenes.denoise = None
-        self.waiting = 0
-        self.session = Session(
-            Materials({it.word: it for it in sources}), self.scenes, self.frames.append, lambda: self.waiting
-        )  # fmt: skip
+        materials = Materials({it.word: it for it in sources})
+        self.session = Session(materials, self.scenes, self.frames.append, self.unread.__len__)
         self.serial = 0
 
     def send(self, bsdf, *others, **members):
         self.serial += 1
-        subjects = [{"bsdf": it} for it in (bsdf, *others)]
-        self.session.show(parse({"subjects": subjects, **members}, STAGES, ("body", "sphere", "scene")), self.serial)
+        state = {"subjects": [{"bsdf": it} for it in (bsdf, *others)], **members}
+        self.session.show(parse(state, self.scenes.names, self.scenes.shapes), self.serial)
 
     def work(self, steps=400):
         """What came, by type or view: header, payload."""
@@ -61,7 +59,7 @@ class Client:
 
     def show(self, bsdf, *others, refine=False, **members):
         self.send(bsdf, *others, **members)
-        self.waiting = 0 if refine else 99
+        self.unread[:] = [] if refine else [None] * 99
         found = self.work()
         assert not [it for it in found if it["type"] == "error"], found
         return found
@@ -114,15 +112,6 @@ def test_a_state_that_is_none_is_refused_in_a_sentence():
     assert (state.theta, state.size) == (89, 1024)
 
 
-def test_the_page_is_told_what_is_declared_of_its_state():
-    """The defaults are those of a state, within its limits and words."""
-    told = json.loads(re.search(r'id="declared">(.*?)</script>', index())[1])
-    assert parse({**told["defaults"], "subjects": [WARD]}, STAGES) == parse({"subjects": [WARD]}, STAGES)
-    for name, (low, high) in told["limits"].items():
-        assert told["defaults"][name] is None or low <= told["defaults"][name] <= high
-    assert all(told["defaults"][name] in words for name, words in told["words"].items())
-
-
 def test_no_type_or_word_of_a_page_reads_a_file(llvm_rgb):
     for bsdf in (
         {"type": "tabulated", "file": "/etc/passwd"},
@@ -154,13 +143,8 @@ def test_every_plugin_opens_with_its_controls(client):
 @pytest.mark.slow
 def test_built_ins_are_drawn(client):
     for name in BUILT_IN:
-        drawn_in_words(client.show({"type": name}, views=["polar", "sampler"]))
-
-
-def drawn_in_words(found):
-    """Among what came are a curve and a histogram."""
-    assert of(found, "polar")[0]["curves"][0]["channel"] == "luminance"
-    assert len(of(found, "sampler")[0]["histogram"]["count"]) > 9
+        found = client.show({"type": name}, views=["polar", "sampler"])
+        assert of(found, "polar") and of(found, "sampler"), name
 
 
 def test_controls_have_the_declared_ranges(client):
@@ -175,21 +159,22 @@ def test_controls_have_the_declared_ranges(client):
 
 
 @pytest.mark.parametrize(
-    ("before", "change"),
+    ("bsdf", "changes"),
     [
-        ({"type": "ward", "alpha": 0.2}, {"alpha": 0.4}),
-        ({"type": "ward", "alpha": 0.2}, {"variant": "ward-duer"}),
-        ({"type": "ward", "alpha": 0.2}, {"diffuse_reflectance": [0.5, 0.1, 0.1]}),
+        ({"type": "ward", "alpha": 0.2}, {"alpha": 0.4, "variant": "ward-duer", "diffuse_reflectance": [0.5, 0.1, 0]}),
         pytest.param({"type": "roughdiffuse", "alpha": 0.8}, {"use_fast_approx": True}, marks=pytest.mark.slow),
         pytest.param({"type": "roughplastic"}, {"eta": 2.0}, marks=pytest.mark.slow),
     ],
 )
-def test_each_kind_of_control_changes_picture_and_curves(client, before, change):
-    first = client.show(before, views=["picture", "polar"], size=64)
-    second = client.show({**before, **change}, views=["picture", "polar"], size=64)
-    assert of(first, "picture")[0]["payload"] != of(second, "picture")[0]["payload"]
-    assert of(first, "polar")[0]["curves"][0]["y"] != of(second, "polar")[0]["curves"][0]["y"]
-    assert of(second, "polar")[0]["serial"] == 2
+def test_each_kind_of_control_changes_picture_and_curves(client, bsdf, changes):
+    before, serial = client.show(bsdf, views=["picture", "polar"], size=64), 1
+    for name, value in changes.items():
+        bsdf, serial = bsdf | {name: value}, serial + 1
+        found = client.show(bsdf, views=["picture", "polar"], size=64)
+        assert of(before, "picture")[0]["payload"] != of(found, "picture")[0]["payload"], name
+        assert of(before, "polar")[0]["curves"][0]["y"] != of(found, "polar")[0]["curves"][0]["y"], name
+        assert of(found, "polar")[0]["serial"] == serial
+        before = found
 
 
 def test_an_error_is_the_plugins_sentence_and_the_others_live_on(client):
@@ -268,11 +253,10 @@ def same_bsdfs():
 
 
 @pytest.mark.usefixtures("same_bsdfs")
-@pytest.mark.parametrize("name", ["kurt", "walter", pytest.param("burley", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["kurt", "walter"])
 def test_no_kernel_is_compiled_where_a_value_changes(client, name):
     views = ["picture", "lobe", "polar", "albedo", "slice", "sampler"]
     found = client.show({"type": name}, views=views, size=64, theta=30)
-    drawn_in_words(found)
     told = of(found, "subject")[0]
     controls, bsdf = told["controls"], told["bsdf"] or {"type": name}
     client.show(bsdf, views=views, size=64, theta=50)  # lobes have other numbers of lines: sizes differ, kernels do not
@@ -297,21 +281,22 @@ def test_the_page_is_told_of_what_has_to_be_compiled(client):
 
 
 def test_pictures_are_refined_until_they_are_finished(client, monkeypatch):
-    monkeypatch.setattr("mi_brdfs.explorer.stages.LONGEST", 60)  # on a busy machine, passes would stay short
+    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 12)
     found = of(client.show({"type": "lambert"}, views=["picture"], size=64, refine=True), "picture")
     spp = [it["spp"] for it in found]
-    assert spp == sorted(spp) and spp[-1] >= 256 and found[-1]["final"] and not found[0]["final"]
+    assert spp == sorted(spp) and spp[-1] >= 12 and found[-1]["final"] and not found[0]["final"]
     pixels = np.frombuffer(found[-1]["payload"], np.uint8).reshape(64, 64, 4)
-    assert (pixels[..., 3] == 255).all() and 60 < pixels[..., :3].mean() < 200
+    assert (pixels[..., 3] == 255).all() and 85 < pixels[..., :3].mean() < 115
 
 
 def test_another_size_keeps_the_picture_until_it_is_as_good(client, monkeypatch):
-    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 32)
-    before = of(client.show(WARD["bsdf"], refine=True, size=64), "picture")[-1]
-    found = of(client.show(WARD["bsdf"], refine=True, size=96), "picture")
+    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 3)
+    before = of(client.show(WARD["bsdf"], views=["picture"], refine=True, size=64), "picture")[-1]
+    found = of(client.show(WARD["bsdf"], views=["picture"], refine=True, size=96), "picture")
     assert found and {it["width"] for it in found} == {96}
     assert all(it["spp"] >= before["spp"] or it["final"] for it in found)
-    assert of(client.show(WARD["bsdf"], size=64, exposure=1), "picture")[0]["spp"] == 1  # of other light
+    (other,) = of(client.show(WARD["bsdf"], views=["picture"], size=64, exposure=1), "picture")
+    assert other["spp"] == 1  # in another exposure none is there
 
 
 def test_a_saved_picture_is_what_is_shown(client, monkeypatch, tmp_path):
@@ -330,7 +315,7 @@ def test_a_saved_picture_is_what_is_shown(client, monkeypatch, tmp_path):
 
 
 def test_a_picture_that_was_denoised_stays_so_in_another_exposure(client, monkeypatch):
-    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 32)
+    monkeypatch.setattr("mi_brdfs.explorer.stages.MOST", 3)
     client.scenes.denoise = lambda pixels: np.full_like(pixels, 0.25)
     last = of(client.show(WARD["bsdf"], views=["picture"], size=64, refine=True), "picture")[-1]
     (brighter,) = of(client.show(WARD["bsdf"], views=["picture"], size=64, exposure=1), "picture")
@@ -357,6 +342,8 @@ def test_views_hold_the_plugins_values(client):
     disc_values = np.frombuffer(disc["payload"], np.float32).reshape(part["height"], -1)
     assert disc_values[part["height"] // 2, part["width"] // 2] == pytest.approx(0.5 / np.pi, rel=1e-3)
     assert sampler["efficiency"] == pytest.approx(1, abs=1e-5) and len(sampler["dots"]) > 100
+    edges, counts = sampler["histogram"]["edges"], sampler["histogram"]["count"]
+    assert np.average(edges[1:], weights=counts) == pytest.approx(1, abs=0.1)  # of weights over their mean
     found = client.show({"type": "lambert", "reflectance": 0.5}, views=["lobe", "polar", "hemisphere"], cosine=False)
     for payload in (of(found, it)[0]["payload"] for it in ("lobe", "hemisphere")):
         np.testing.assert_allclose(np.frombuffer(payload, np.float32), 0.5 / np.pi, rtol=1e-3)
@@ -419,17 +406,6 @@ def with_file(llvm_rgb):
     return Client(sources=list(find_sources(LOFT)))
 
 
-def test_a_measured_file_opens_and_is_fitted(with_file):
-    subject = {"type": "tabulated", "file": LOFT}
-    found = with_file.show(subject, views=["polar"])
-    assert of(found, "subject")[0]["error"] is None and of(found, "polar")[0]["curves"][0]["y"]
-    with_file.session.ask({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"})
-    *progress, last = of(with_file.work(), "fit")
-    assert progress and progress[-1]["done"] <= progress[-1]["total"]
-    assert last["bsdf"]["type"] == "lambert" and 0 < last["error"] < 1
-    assert of(with_file.show(subject, last["bsdf"], views=["polar"]), "polar", 1)
-
-
 NAMES = [
     b"paint (1).bsdf", b'it\'s "gold" & 100%25;.bsdf', b"<b>.bsdf", b"-$5 \\$(x)`.bsdf", b"line\n\t\x1b[1m--.bsdf",
     "漆é.bsdf".encode(), b"x.xml.bsdf", b"\xff'\xe4.bsdf",
@@ -459,7 +435,7 @@ def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch
             assert "only names in UTF-8" in told["xml"] and "only names in UTF-8" in told["dict"]
         else:
             assert isinstance(mi.load_string(told["xml"].replace(">", ' version="3.0.0">', 1)), mi.BSDF), name
-            assert isinstance(mi.load_dict(eval(told["dict"])), mi.BSDF), name
+            assert eval(told["dict"])["filename"] == str(tmp_path / source.word)
     printed = subprocess.run(["bash", "-c", "\n".join(commands)], capture_output=True).stdout
     assert printed.split(b"\0")[:-1] == words
 
@@ -480,7 +456,11 @@ def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     with_file.session.send = edit
     assert not of(with_file.work(1), "fit")
     found = with_file.work()
-    assert [it["model"] for it in of(found, "fit") if "bsdf" in it] == models
+    fits = [it for it in of(found, "fit") if "bsdf" in it]
+    assert [it["model"] for it in fits] == [it["bsdf"]["type"] for it in fits] == models
+    assert all(0 < it["error"] < 1 for it in fits)
+    done = [it["done"] for it in of(found, "fit")]
+    assert len(done) > 2 and done == sorted(done) and done[-1] == len(models)
     kinds = [it.get("view", it["type"]) for it in found]
     assert kinds.index("polar") < kinds.index("fit") and of(found, "fitted")[0]["error"] is None
     with_file.session.ask({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"})
@@ -488,21 +468,24 @@ def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     assert not [it for it in with_file.work() if "bsdf" in it]
 
 
+def staged(scene, material=None):
+    """A scene of a user, in which a material is replaced."""
+    return Stages(UserScene(scene, material)).stage(Setting("", "scene", 8))
+
+
 def shades_show(scene, material=None):
-    """The client of a scene whose pictures show what its material is replaced by."""
+    """Pictures of a scene show what its material is replaced by."""
     client, shown = Client(UserScene(scene, material)), {"views": ["picture"], "shape": "scene", "size": 32}
     dark, bright = (of(client.show({"type": "lambert", "reflectance": it}, **shown), "picture") for it in (0.1, 0.9))
-    assert dark[0]["payload"] != bright[0]["payload"]
-    return client
+    return dark[0]["payload"] != bright[0]["payload"]
 
 
 def test_the_users_scene_has_its_material_replaced(llvm_rgb):
     scene = ROOT / "scenes" / "cornell_box.xml"
-    client = shades_show(scene)
-    (film,) = [it.film() for it in client.session._pictures[0][1].stage.scene.sensors()]
-    assert film.rfilter().is_box_filter()  # as the denoiser expects
-    client = shades_show(scene, "ward")  # the id of a shape
-    assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == ["ward"]
+    assert shades_show(scene)
+    stage = staged(scene, "ward")  # the id of a shape
+    assert [it.id() for it in stage.shapes] == ["ward"]
+    assert stage.scene.sensors()[0].film().rfilter().is_box_filter()  # as the denoiser expects
 
 
 TWINS = """<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"/>
@@ -524,9 +507,7 @@ def twins(llvm_rgb, tmp_path):
 )
 def test_materials_that_are_alike_are_not_one(twins, id, shapes):
     """Mitsuba makes one of those, and of meshes that share one, and forgets the names of the rest."""
-    client = Client(UserScene(twins, id))
-    client.show({"type": "lambert"}, views=["picture"], shape="scene", size=32)
-    assert [it.id() for it in client.session._pictures[0][1].stage.shapes] == shapes
+    assert [it.id() for it in staged(twins, id).shapes] == shapes
     scene = SceneFile(str(twins), replaced={id: GREY}).load()
     assert [it.id() for it in scene.shapes() if it.bsdf().class_name() != "SmoothDiffuse"] == shapes
 
@@ -554,7 +535,7 @@ def test_materials_that_instances_show(llvm_rgb, tmp_path):
     (found,) = find_sources(str(path))
     assert found.name == "group.xml:paint"
     path.write_text(GROUP.replace("mute", "diffuse"))
-    shades_show(path, "paint")
+    assert shades_show(path, "paint")
 
 
 def test_each_material_of_a_scene_is_its_own(twins):
@@ -593,7 +574,7 @@ def test_pictures_replacements_and_copies_are_the_same(llvm_rgb, tmp_path, word,
     source = BSDFSource("lambert", "lambert", "lambert", None, {"reflectance": "0.1"})
     replaced = SceneFile(str(path), box_filter=True, replaced={word: source})
     scenes = replaced.load(), SceneFile(str(tmp_path / "copy.xml"), box_filter=True).load()
-    stage = Stages(UserScene(path, word)).stage(Setting("", "scene", 8))
+    stage = staged(path, word)
     pictures = [np.array(mi.render(it, spp=16)) for it in scenes]
     with stage.showing(mi.load_dict({"type": "lambert", "reflectance": 0.1}), Pose()):
         pictures.append(np.array(mi.render(stage.scene, spp=16)))
@@ -614,7 +595,7 @@ def test_part_of_a_mixture_is_not_shown_in_part(llvm_rgb, tmp_path):
     mixture = '<bsdf type="blendbsdf"><float name="weight" value="0.5"/><ref id="outer"/><ref id="inner"/></bsdf>'
     path.write_text(TWISTED.format(mixture, "inner"))
     with pytest.raises(ValueError, match="inner is also part of other materials"):
-        Stages(UserScene(path, "inner")).stage(Setting("", "scene", 8))
+        staged(path, "inner")
 
 
 def test_a_mesh_that_is_refused_breaks_no_picture(client, tmp_path):
@@ -647,13 +628,9 @@ def test_camera_and_light_are_moved_and_come_back(client, tmp_path):
     assert client.scenes.add(tmp_path / "box.ply", "box.ply") == {"shape": "box.ply"}
 
     def picture(**members):
-        client.serial += 1
-        data = {"subjects": [{"bsdf": {"type": "lambert"}}], "views": ["picture"], "size": 64, **members}
-        client.session.show(parse(data, client.scenes.names, client.scenes.shapes), client.serial)
-        (found,) = of(client.work(), "picture")
+        (found,) = of(client.show({"type": "lambert"}, views=["picture"], size=64, **members), "picture")
         return np.frombuffer(found["payload"], np.uint8).reshape(64, 64, 4)[..., :3].astype(float)
 
-    client.waiting = 99
     usual, *moved = (picture(**it) for it in ({}, {"yaw": 90}, {"pitch": 60}, {"turn": 90}, {"shape": "box.ply"}))
     assert all(abs(it - usual).mean() > 2 for it in moved)
     assert (picture() == usual).all()
@@ -683,9 +660,7 @@ def test_a_material_is_written_into_a_copy_of_the_scene(llvm_rgb, tmp_path):
 
 def exported(subjects, **vary):
     data = {"subjects": [{"bsdf": it, "name": it["type"]} for it in subjects]}
-    stages = Stages(UserScene())
-    stages.denoise = None
-    return page(parse({**data, "size": 64}, STAGES), Materials(), stages, data, vary)
+    return page(parse({**data, "size": 64}, STAGES), Materials(), Client().scenes, data, vary)
 
 
 def test_an_exported_page_holds_each_place_of_its_scrubbers(llvm_rgb, monkeypatch):
@@ -714,12 +689,8 @@ def test_the_scripts_of_an_exported_page_can_be_one():
     assert len(names) > 100 and sorted(set(names)) == sorted(names)
 
 
-def test_a_page_that_cannot_be_exported_is_refused(llvm_rgb, monkeypatch):
+def test_a_page_that_is_too_large_is_refused(llvm_rgb, monkeypatch):
     monkeypatch.setattr("mi_brdfs.explorer.export.SPP", 1)
-    with pytest.raises(StateError, match="gloss is no number of these BSDFs; choose theta, alpha"):
-        exported([{"type": "ward", "alpha": 0.2}], gloss=(0.1, 0.2), theta=(0,))
-    with pytest.raises(StateError, match="reflectance is no number of these BSDFs; choose theta"):
-        exported([{"type": "lambert"}], reflectance=(0.1, 0.2))
     monkeypatch.setattr("mi_brdfs.explorer.export.LARGEST", 1000)
     with pytest.raises(StateError, match=r"The page would have .* fewer values of parameters"):
         exported([{"type": "lambert"}], theta=(0,))

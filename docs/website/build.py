@@ -25,7 +25,7 @@ SETTINGS = {
     "copyright": "the mi_brdfs authors",
     "version": mi_brdfs.__version__,
     "release": mi_brdfs.__version__,
-    "extensions": ["myst_parser", "website.mathml", "website.finish"],
+    "extensions": ["myst_parser", "website.finish"],
     "myst_enable_extensions": ["attrs_inline", "colon_fence", "dollarmath"],
     "myst_heading_anchors": 3,
     "html_theme": "furo",

@@ -1,4 +1,5 @@
-"""A Sphinx extension: what a page's HTML needs for narrow screens, and for links to pictures."""
+"""A Sphinx extension: formulas as MathML, which browsers show without scripts, fonts or a network; and what a page's
+HTML needs for narrow screens, and for links to pictures."""
 
 from __future__ import annotations
 
@@ -6,8 +7,16 @@ import re
 from html import escape
 from itertools import count
 
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
+from sphinx.util import logging
 
+logger = logging.getLogger(__name__)
+
+LONG = 100
+"""The length in TeX of a formula in a line that may be wider than a narrow page."""
 CARD = "_static/card.jpg"
 DESCRIPTION = "The classical BRDFs as plugins for Mitsuba 3, and tools that plot, fit and check any BSDF."
 MANY = 4
@@ -21,8 +30,35 @@ WORD = re.compile(r'<span class="w">[^<]*</span>|((?:(?!<span class="w">)<span[^
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.config.html_math_renderer = "mathml"
     app.connect("html-page-context", lambda app, page, template, context, doctree: _finish(context))
     return {"parallel_read_safe": True}
+
+
+# --- Formulas -------------------------------------------------------------------------------------------------------
+
+
+def _inline(writer, node: nodes.math) -> None:
+    formula = _mathml(node)
+    writer.body.append(f'<span class="long">{formula}</span>' if len(node.astext()) > LONG else formula)
+    raise nodes.SkipNode
+
+
+def _block(writer, node: nodes.math_block) -> None:
+    writer.body.append(f'<div class="formula">{_mathml(node, as_block=True)}</div>\n')
+    raise nodes.SkipNode
+
+
+def _mathml(node: nodes.Element, as_block: bool = False) -> str:
+    try:
+        return tex2mathml(node.astext(), as_block)
+    except MathError as error:
+        logger.warning("%s in %s", error, node.astext(), location=node)
+        return ""
+
+
+# --- Pages ----------------------------------------------------------------------------------------------------------
 
 
 def _finish(context: dict) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from itertools import groupby
 from pathlib import Path, PurePosixPath
@@ -20,7 +20,7 @@ from mi_brdfs.model import Model, Plugin
 from mi_brdfs.tabulated.tabulated import Tabulated
 
 from . import live, notebooks
-from .reference import inline, with_formulas
+from .reference import inline, outside_code, with_formulas
 
 GUIDE = {
     "docs/python.md": "guide/python",
@@ -44,14 +44,11 @@ FILES = GUIDE | {
     "docs/extending.md": "extending",
     "docs/sampling.md": "sampling",
     "scenes/README.md": "scenes",
-    "scenes/shading": "shading",
     "scenes/shading/README.md": "shading",
-    "scenes/polarization": "polarization",
     "scenes/polarization/README.md": "polarization",
-    "notebooks": "notebooks/index",
     "notebooks/README.md": "notebooks/index",
 }
-"""Pages by file or folder of the repository."""
+"""Pages by file of the repository."""
 
 OTHERS: tuple[type[Plugin], ...] = (Tabulated, Shading)
 """The plugins that are no models."""
@@ -61,15 +58,6 @@ TITLES = {"bench": "Benchmarks", "testing": "Test coverage", "guide/limits": "Kn
 
 PICTURES = "notebooks/pictures"
 """Where the pictures of notebooks are."""
-
-CONTENTS = """
-```{{toctree}}
-:hidden:
-:caption: {caption}
-
-{pages}
-```
-"""
 
 
 def write_pages(folder: Path) -> None:
@@ -82,10 +70,7 @@ def write_pages(folder: Path) -> None:
 
 def _pages(folder: Path) -> dict[str, tuple[str, str]]:
     """Return the text of each page with the file that its links start from."""
-    pages = {}
-    for file, page in FILES.items():
-        if (ROOT / file).is_file():
-            pages[page] = (file, (ROOT / file).read_text(encoding="utf-8"))
+    pages = {page: (file, (ROOT / file).read_text(encoding="utf-8")) for file, page in FILES.items()}
     pages["index"] = ("README.md", _front(folder))
     pages["folklore"] = ("docs/folklore.md", _folklore(pages["folklore"][1]))
     for page, title in TITLES.items():
@@ -118,18 +103,18 @@ def _front(folder: Path) -> str:
     text = re.sub(r"<!-- .*? -->\n\n?", "", (ROOT / "README.md").read_text(encoding="utf-8"))
     examples = _linked(_thumbnails(), PurePosixPath("mi_brdfs/models/README.md"), folder)
     text = re.sub(r"^\[!\[[^\]]*\]\(docs/gallery\.jpg\)\].*$", lambda _: examples, text, flags=re.MULTILINE)
-    return text.replace("\n## ", f"\n{live.links()}\n\n## ", 1) + "".join(_contents())
+    return text.replace("\n## ", f"\n{live.links()}\n\n## ", 1) + _contents()
 
 
-def _contents() -> Iterator[str]:
-    for caption, pages in {
+def _contents() -> str:
+    parts = {
         "Guide": list(GUIDE.values()),
         "Gallery": ["gallery", "scenes", "shading", "polarization"],
         "Notebooks": ["notebooks/index"],
         "Reference": ["reference/index", "folklore"],
         "More": ["extending", "sampling", "bench", "testing", "development", "changelog"],
-    }.items():
-        yield CONTENTS.format(caption=caption, pages="\n".join(pages))
+    }
+    return "".join(f"\n{_hidden(pages, caption)}\n" for caption, pages in parts.items())
 
 
 def notebook_order() -> list[str]:
@@ -143,9 +128,10 @@ def _glance(pictures: Path, link: re.Match) -> str:
     return f"[![](/{PICTURES}/{picture.name}){{.glance}}{link[1]}]({link[2]}.ipynb)"
 
 
-def _hidden(names: list[str]) -> str:
-    """Return an entry in the contents for each page of a folder."""
-    return "```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```"
+def _hidden(names: list[str], caption: str = "") -> str:
+    """Return an entry in the contents for each of some pages."""
+    options = [":hidden:", *([f":caption: {caption}"] if caption else [])]
+    return "\n".join(["```{toctree}", *options, "", *names, "```"])
 
 
 def _scenes() -> str:
@@ -172,7 +158,7 @@ def _gallery() -> str:
     parts = ["# Gallery", about, _thumbnails()]
     for model in by_family(own_models()):
         name = model.plugins[0]
-        parts += [f"## {name}", f"{_summary(name)} [Formulas and parameters](#{name})", models.strip_picture(model)]
+        parts += [f"## {name}", f"{_summary(model)} [Formulas and parameters](#{name})", models.strip_picture(model)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -211,20 +197,19 @@ def summaries() -> dict[str, str]:
 
 def questions() -> dict[str, list[str]]:
     """Return the questions that pages answer, by the name of the page."""
-    texts = {page: (ROOT / file).read_text(encoding="utf-8") for file, page in FILES.items() if file.endswith(".md")}
+    texts = {page: (ROOT / file).read_text(encoding="utf-8") for file, page in FILES.items()}
     found = {page: re.findall(r"^\*\*([^*]+\?)\*\*", text, re.MULTILINE) for page, text in texts.items()}
     return {page: asked for page, asked in found.items() if asked}
 
 
 def _reference() -> str:
-    names = list(summaries())
+    plugins = [*own_models(), *OTHERS]
     introduction = with_formulas(models.INTRODUCTION, ()).rstrip() + " In a terminal, $\\omega_i$ is wi."
-    listed = "\n".join(f"* [`{name}`](#{name}): {_summary(name)}" for name in names)
-    return "\n\n".join([introduction, _thumbnails(), listed, _hidden(names)]) + "\n"
+    listed = "\n".join(f"* [`{it.plugins[0]}`](#{it.plugins[0]}): {_summary(it)}" for it in plugins)
+    return "\n\n".join([introduction, _thumbnails(), listed, _hidden([it.plugins[0] for it in plugins])]) + "\n"
 
 
-def _summary(name: str) -> str:
-    plugin = next(plugin for plugin in [*own_models(), *OTHERS] if plugin.plugins[0] == name)
+def _summary(plugin: type[Plugin]) -> str:
     return re.sub(r"``(.+?)``", r"`\1`", plugin.summary())
 
 
@@ -266,15 +251,13 @@ def _linked(text: str, origin: PurePosixPath, folder: Path) -> str:
             return f"{match[1]}(/{place})"
         return f"{match[1]}({copied(file)})" if target else match[0]
 
-    parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
-    for k in range(0, len(parts), 2):
-        parts[k] = LINK.sub(link, IMAGE.sub(image, parts[k]))
-    return "".join(parts)
+    return outside_code(text, lambda it: LINK.sub(link, IMAGE.sub(image, it)))
 
 
 def _path(origin: PurePosixPath, target: str) -> str:
-    """Return where a link leads that stands in a file."""
-    return os.path.normpath(origin.parent / target).replace("\\", "/")
+    """Return where a link leads that stands in a file; a folder is its README.md."""
+    found = os.path.normpath(origin.parent / target).replace("\\", "/")
+    return f"{found}/README.md" if (ROOT / found).is_dir() else found
 
 
 def _place(file: str, fragment: str) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from .formulas import Expression, Node
 from .search import find
@@ -19,10 +19,13 @@ URL = re.compile(r"(?<![(<])(https?://\S+?)(?=[.,;)]*(?:\s|$))")
 def with_formulas(page: str, parameters: Collection[str]) -> str:
     """Return a manual page in Markdown with its formulas in TeX: blocks that are indented, and those in the text and in
     tables, except for ranges and literals."""
+    return outside_code(page, lambda text: "\n\n".join(_paragraph(it, parameters) for it in text.split("\n\n")))
+
+
+def outside_code(page: str, change: Callable[[str], str]) -> str:
+    """Return a page in Markdown with all changed but its blocks of code."""
     parts = re.split(r"(^```.*?^```$)", page, flags=re.MULTILINE | re.DOTALL)
-    for k in range(0, len(parts), 2):
-        parts[k] = "\n\n".join(_paragraph(text, parameters) for text in parts[k].split("\n\n"))
-    return "".join(parts)
+    return "".join(part if k % 2 else change(part) for k, part in enumerate(parts))
 
 
 def _paragraph(text: str, parameters: Collection[str]) -> str:

@@ -71,9 +71,8 @@ def _is_mathematical(word: str, parameters: Collection[str]) -> bool:
     except ValueError:
         return False
     known = PAIRS | FUNCTIONS | set(parameters)
-    return all(len(base) == 1 or name in known or base in known
-               for name in names for base in [name.rstrip("'").partition("_")[0]
-                                              if name[0] not in GREEK else name[0]])  # fmt: skip
+    bases = [name[0] if name[0] in GREEK else name.rstrip("'").partition("_")[0] for name in names]
+    return all(len(base) == 1 or name in known or base in known for name, base in zip(names, bases, strict=True))
 
 
 def _is_formula(piece: str, following: str, display: bool) -> bool:

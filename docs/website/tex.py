@@ -21,9 +21,8 @@ def tex(node: Expression, display: bool = True) -> str:
     match node.kind:
         case "call":
             name = node.signs[0]
-            shown = (rf"\{name}" if name in FUNCTIONS - {"mix"} else rf"\operatorname{{{name}}}"
-                     if name in FUNCTIONS else symbol(name))  # fmt: skip
-            return rf"{shown}\left({parts[0]}\right)"
+            known = rf"\operatorname{{{name}}}" if name == "mix" else rf"\{name}"
+            return rf"{known if name in FUNCTIONS else symbol(name)}\left({parts[0]}\right)"
         case "root":
             return rf"\sqrt{{{parts[0]}}}"
         case "abs":

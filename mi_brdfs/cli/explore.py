@@ -148,18 +148,15 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
     if len(targets) > SUBJECTS:
         fail(f"a page shows {SUBJECTS} BSDFs at most, these are {len(targets)}", Exit.USAGE)
     sources, subjects = [], []
-    known = set(presets())
     with failing(Exit.USAGE):
-        each = shared(targets, given)
-    for target, options in zip(targets, each, strict=True):
-        with failing(Exit.USAGE):
+        for target, options in zip(targets, shared(targets, given), strict=True):
             word, own = split(target)
             texts = options | own
             if word in DATA:
                 word = texts.pop("filename", word)
             values = plain({name: value_of(text) for name, text in texts.items()})
-            if word in known:
-                subject = {**Materials().expanded({"type": PRESET, "name": word}), **values}
+            if word in presets():
+                subject = {"type": PRESET, "name": word, **values}
             elif is_measured(word) and os.path.exists(word):
                 sources.append(source_of(word, {}))
                 subject = {"type": MEASURED, "file": sources[-1].word, **values}
@@ -210,7 +207,7 @@ def _export(
         state = parse(data, scenes.names, scenes.shapes)
         with progress("Drawing") as bar:
             combinations = math.prod(len(values) for name, values in varied.items() if name != "theta")
-            task = bar.add_task("", total=len(sources) * combinations)
+            task = bar.add_task("", total=len(state.subjects) * combinations)
             materials = Materials({it.word: it for it in sources})
             text = page(state, materials, scenes, data, varied, lambda: bar.advance(task))
     write_text(file, text)

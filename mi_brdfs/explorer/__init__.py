@@ -80,21 +80,18 @@ def explore(*subjects: str | Path | dict[str, Any]) -> Page:
 def _subject(given: str | Path | dict[str, Any]) -> dict[str, Any]:
     """Return what a page knows a BSDF by, or raise a ValueError if it cannot be shown."""
     subject = str(given.absolute()) if isinstance(given, Path) else given
-    if not (isinstance(subject, str) or (isinstance(subject, dict) and isinstance(subject.get("type"), str))):
+    bsdf: Bsdf
+    if isinstance(subject, dict) and isinstance(subject.get("type"), str):
+        bsdf, name = plain(subject), subject["type"]
+    elif isinstance(subject, str):
+        name = subject.rpartition("/")[2]
+        if is_measured(subject):
+            return {"bsdf": {"type": MEASURED, "file": subject}, "name": name}  # the server knows whether there is one
+        bsdf = {"type": PRESET, "name": subject} if subject in presets() else {"type": subject}
+    else:
         raise ValueError(
             f"{brief(repr(given))} cannot be shown; give a dict such as {{'type': 'ward'}}, the name of a plugin or of "
             "a published material, or the path of a measured file."
         )
-    if isinstance(subject, dict):
-        bsdf, name = plain(subject), subject["type"]
-    else:
-        bsdf, name = _named(subject), subject.rpartition("/")[2]
-    if not (isinstance(subject, str) and bsdf["type"] == MEASURED):  # the server knows files
-        Materials().expanded(checked(bsdf))
+    Materials().expanded(checked(bsdf))
     return {"bsdf": bsdf, "name": name}
-
-
-def _named(word: str) -> Bsdf:
-    if word in presets():
-        return {"type": PRESET, "name": word}
-    return {"type": MEASURED, "file": word} if is_measured(word) else {"type": word}

@@ -61,14 +61,14 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
         elif False in parameter.words:
             name, default = parameter.names[0], parameter.fit_words[0]
             yield _control(name, parameter.text, "flag", bsdf.get(name, default), default, group)
-        elif parameter.words:
-            yield _choice(parameter.names[0], parameter.text, tuple(parameter.words), bsdf, group, parameter.names[1:])
-            word = bsdf.get(parameter.names[0], next(iter(parameter.words)))
+        elif parameter.choices:
+            name, *others = parameter.names
+            usual = parameter.choices[0] if parameter.words else None  # none of a library need be named
+            word = bsdf.get(name, usual)
+            control = _control(name, parameter.text, "choice", word, usual, group)
+            yield control | {"words": [*parameter.choices], "excludes": others, "optional": usual is None}
             own = parameter.words.get(word, {}) if isinstance(word, str) else {}
             yield from _controls(own.values(), bsdf, group)
-        elif parameter.choices:
-            control = _choice(parameter.names[0], parameter.text, parameter.choices, bsdf, group)
-            yield control | {"value": bsdf.get(parameter.names[0]), "default": None, "optional": True}
         elif not isinstance(parameter, (File, Preset)):
             for row in parameter.rows():
                 yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group)
@@ -84,8 +84,7 @@ def _spelled(parameter: Parameter, bsdf: Bsdf, group: str) -> Iterator[Control]:
         here = [it.name for it in way]
         for it in way:
             default = first.default if it is first and not is_other else None
-            control = _colour(it, bsdf, default, group) if it.colour else _number(it, bsdf, default, group)
-            yield control | {
+            yield _quantity(it, bsdf, default, group) | {
                 "optional": len(ways) > 1 or first.default is None,
                 "excludes": [name for name in names if name not in here],
                 "also": {name: middle for name in here if name != it.name},
@@ -134,22 +133,25 @@ def _popped(parameter: PerLobe, number: str, bsdf: Bsdf) -> Bsdf:
 # --- Plugins that declare nothing -----------------------------------------------------------------------------------
 
 
-def traversed(bsdf: mi.BSDF, given: Mapping[str, Any]) -> list[Control]:
-    """Return the controls of the numbers and colours that ``mitsuba.traverse`` shows."""
+def traversed(bsdf: mi.BSDF, usual: Mapping[str, Any]) -> list[Control]:
+    """Return the controls of the numbers and colours that ``mitsuba.traverse`` shows, with their usual values."""
     found = []
     for key, value in mi.traverse(bsdf):
         is_value = isinstance(value, (int, float, mi.Float, mi.Color3f)) and not isinstance(value, bool)
         numbers = np.ravel(np.array(value, np.float64)) if is_value else np.zeros(0)
+        if len(numbers) not in (1, 3) or not np.isfinite(numbers).all():
+            continue
         name, short = key_to_name(key), key.rpartition(".")[2]
-        if len(numbers) == 1 and np.isfinite(numbers).all():
-            limits = _guess(short if short not in VALUES else name, float(numbers[0]))
-            quantity, value = Quantity(name, limits, None, key), float(numbers[0])
-            found.append(_number(quantity, {name: value}, value, ""))
-        elif len(numbers) == 3 and np.isfinite(numbers).all():
-            colour = [float(f"{it:.6g}") for it in numbers]
-            high = 1.0 if max(colour) <= 1 else math.ceil(2 * max(colour))
-            found.append(_colour(Quantity(name, (0, high), None, key), {name: colour}, colour, ""))
-    return [it | {"default": given.get(it["name"], it["default"])} for it in found]
+        given: Any
+        if is_colour := len(numbers) == 3:
+            given = [float(f"{it:.6g}") for it in numbers]
+            limits = 0.0, 1.0 if max(given) <= 1 else math.ceil(2 * max(given))
+        else:
+            given = float(numbers[0])
+            limits = _guess(short if short not in VALUES else name, given)
+        quantity = Quantity(name, limits, None, key, is_colour)
+        found.append(_quantity(quantity, {name: given}, usual.get(name, given), ""))
+    return found
 
 
 def key_to_name(key: str) -> str:
@@ -177,25 +179,16 @@ def _control(name: str, text: str, kind: str, value: Any, default: Any, group: s
     }  # fmt: skip
 
 
-def _number(it: Quantity, bsdf: Bsdf, default: Any, group: str) -> Control:
-    low, high, scale = slider(*(it.usual or it.limits))
-    control = _control(it.name, it.text, "number", bsdf.get(it.name, default), default, group)
-    return control | {"low": low, "high": high, "scale": scale, "optional": default is None}
-
-
-def _colour(it: Quantity, bsdf: Bsdf, default: Any, group: str) -> Control:
+def _quantity(it: Quantity, bsdf: Bsdf, default: Any, group: str) -> Control:
     value = bsdf.get(it.name, default)
-    value, default = ([x] * 3 if isinstance(x, (int, float)) else x for x in (value, default))
-    low, high = it.limits
-    control = _control(it.name, it.text, "colour", value, default, group)
-    return control | {"low": low, "high": min(high, 10.0), "scale": "linear", "optional": default is None}
-
-
-def _choice(
-    name: str, text: str, words: tuple[str, ...], bsdf: Bsdf, group: str, excludes: list[str] | None = None
-) -> Control:
-    control = _control(name, text, "choice", bsdf.get(name, words[0]), words[0], group)
-    return control | {"words": list(words), "excludes": excludes or []}
+    if it.colour:
+        kind, (low, high), scale = "colour", it.limits, "linear"
+        high = min(high, 10.0)
+        value, default = ([x] * 3 if isinstance(x, (int, float)) else x for x in (value, default))
+    else:
+        kind, (low, high, scale) = "number", slider(*(it.usual or it.limits))
+    control = _control(it.name, it.text, kind, value, default, group)
+    return control | {"low": low, "high": high, "scale": scale, "optional": default is None}
 
 
 def slider(low: float, high: float) -> tuple[float, float, str]:

@@ -7,8 +7,8 @@ import gzip
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from ..parameters.messages import listed
 from ..rendering.output import encoded
 from . import stages
-from .controls import LOBES, with_value
+from .controls import LOBES, Control, with_value
 from .materials import Materials
 from .state import Bsdf, State, StateError, declared
 from .views import VIEWS, Frame, frame, packed, text
@@ -60,23 +60,32 @@ def page(
     ``page_state`` is what the page itself said of it. ``on_progress`` is called after the views of each subject at each
     combination of the values. Raise a StateError if a subject cannot be shown, none has such a parameter, or the page
     would be too large."""
-    controls = (it for given in state.subjects for it in materials.controls(materials.expanded(given)))
-    known = dict.fromkeys(it["name"] for it in controls if it["kind"] == "number")
-    if missing := [name for name in vary or {} if name not in ("theta", *known)]:
-        raise StateError(f"{missing[0]} is no number of these BSDFs; choose {listed(['theta', *known])}.")
-    state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
-    vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
-    baked = _Baked(state, materials, scenes, vary, on_progress)
-    frames = [(at, it.encode() if isinstance(it, str) else it, isinstance(it, str)) for at, it in baked.frames()]
     told = page_state.get("subjects") or [{} for _ in state.subjects]
     if len(told) != len(state.subjects):
         raise StateError("The state of a page is of other materials than those shown.")
-    subjects = [{**it, "bsdf": bsdf} for it, bsdf in zip(told, baked.subjects, strict=True)]
-    is_same = state.axis == "theta_o"  # the cartesian plot has the curves of the polar one
+    bsdfs = [materials.expanded(it) for it in state.subjects]
+    controls = [materials.controls(it) for it in bsdfs]
+    now: dict[str, Any] = {"theta": state.theta}
+    for control in chain(*controls):
+        if control["kind"] == "number":
+            now.setdefault(control["name"], control["value"])
+    if missing := [name for name in vary or {} if name not in now]:
+        raise StateError(f"{missing[0]} is no number of these BSDFs; choose {listed(now)}.")
+    state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
+    vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
+    views = set(VIEWS if len(vary) == 1 else state.views)
+    # Along θo, the cartesian plot has its curves from the polar one.
+    is_same = state.axis == "theta_o" and not views.isdisjoint({"polar", "cartesian"})
+    views = views - {"cartesian"} | {"polar"} if is_same else views
+    baked = _Baked(state, materials, scenes, vary, [name for name in VIEWS if name in views], on_progress)
+    drawn = chain(*(baked.frames(k, *own) for k, own in enumerate(zip(bsdfs, controls, strict=True))))
+    frames = [(at, it.encode() if isinstance(it, str) else it, isinstance(it, str)) for at, it in drawn]
+    full = [bsdf | _values(own) for bsdf, own in zip(bsdfs, controls, strict=True)]
+    starts = {name: _nearest(values, now[name]) for name, values in vary.items()}
     content = {
-        "state": {**page_state, "subjects": subjects},
-        "scrubbers": [{"name": name, "values": values, "start": baked.start[name]} for name, values in vary.items()],
-        "views": ["picture", *baked.views, *(["cartesian"] if "polar" in baked.views and is_same else [])],
+        "state": {**page_state, "subjects": [{**it, "bsdf": bsdf} for it, bsdf in zip(told, full, strict=True)]},
+        "scrubbers": [{"name": name, "values": values, "start": starts[name]} for name, values in vary.items()],
+        "views": ["picture", *baked.views, *(["cartesian"] if is_same else [])],
         "frames": [(at, len(it), is_text) for at, it, is_text in frames],
         "data": base64.b64encode(gzip.compress(b"".join(it for _, it, _ in frames), mtime=0)).decode(),
     }
@@ -88,48 +97,41 @@ def page(
     return found
 
 
+def _values(controls: list[Control]) -> Bsdf:
+    return {it["name"]: it["value"] for it in controls if it["value"] is not None and it["name"] != LOBES}
+
+
+def _nearest(values: Sequence[float], value: float | None) -> int:
+    """Return where the value is that is nearest to another one, or the first where there is no other."""
+    return min(range(len(values)), key=lambda at: 0 if value is None else abs(values[at] - value))
+
+
 @dataclass
 class _Baked:
-    """The frames of a page, for each place of its scrubbers."""
+    """Makes the frames of a page, each with the places of the scrubbers at which it is shown, None for any."""
 
     state: State
     materials: Materials
     scenes: stages.Stages
     vary: Varied
+    views: list[str]
+    """Besides the picture."""
     on_progress: Callable[[], None]
-    subjects: list[Bsdf] = field(default_factory=list)
-    """The plugin dicts with all their values."""
-    start: dict[str, int] = field(default_factory=dict)
-    """Where each scrubber of something stands at first: where it is nearest to the state."""
 
-    def frames(self) -> Iterator[tuple[At, Frame]]:
-        """Yield frames, each with the places of the scrubbers at which it is shown, None for any."""
+    def frames(self, k: int, bsdf: Bsdf, controls: list[Control]) -> Iterator[tuple[At, Frame]]:
+        """Yield all frames of a subject."""
         nowhere: At = (None,) * len(self.vary)
-        self._begin("theta", self.state.theta)
-        for k, given in enumerate(self.state.subjects):
-            bsdf = self.materials.expanded(given)
-            controls = self.materials.controls(bsdf)
-            self.subjects.append({**bsdf, **{it["name"]: it["value"] for it in controls
-                                             if it["value"] is not None and it["name"] != LOBES}})  # fmt: skip
-            told = {"controls": controls, **self.materials.written(bsdf), **self.materials.described(bsdf)}
-            yield nowhere, text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told)
-            numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
-            varied = [numbers.get(name) if name != "theta" else None for name in self.vary]
-            for each in filter(None, varied):
-                self._begin(each["name"], each["value"])
-            ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
-            for values in product(*ways):
-                other = bsdf
-                for control, (_, value) in zip(varied, values, strict=True):
-                    other = with_value(other, control, value) if control else other
-                yield from self._views(k, other, tuple(at for at, _ in values))
-                self.on_progress()
-
-    def _begin(self, name: str, value: float | None) -> None:
-        """Take the value that is nearest to what a subject has."""
-        values = self.vary[name]
-        nearest = min(range(len(values)), key=lambda at: abs(values[at] - (values[0] if value is None else value)))
-        self.start.setdefault(name, nearest)
+        told = {"controls": controls, **self.materials.written(bsdf), **self.materials.described(bsdf)}
+        yield nowhere, text(type="subject", serial=0, subject=k, bsdf=None, error=None, **told)
+        numbers = {it["name"]: it for it in controls if it["kind"] == "number"}
+        varied = [numbers.get(name) if name != "theta" else None for name in self.vary]
+        ways = [enumerate(self.vary[it["name"]]) if it else [(None, 0.0)] for it in varied]
+        for values in product(*ways):
+            other = bsdf
+            for control, (_, value) in zip(varied, values, strict=True):
+                other = with_value(other, control, value) if control else other
+            yield from self._views(k, other, tuple(at for at, _ in values))
+            self.on_progress()
 
     def _views(self, k: int, bsdf: Bsdf, places: At) -> Iterator[tuple[At, Frame]]:
         def at(theta: int) -> At:
@@ -154,15 +156,6 @@ class _Baked:
         payload = encoded(mi.Bitmap(np.ascontiguousarray(rgb)), "JPEG", 92)
         header |= {"type": "picture", "serial": 0, "subject": k, "final": True, "mime": "image/jpeg"}
         yield places, packed(payload, **header)
-
-    @property
-    def views(self) -> list[str]:
-        """The views that are drawn, besides the picture: all if nothing but the angle is varied, else those of the
-        state. Along θo, the cartesian plot has its curves from the polar one."""
-        wanted = set(VIEWS if len(self.vary) == 1 else self.state.views)
-        if self.state.axis == "theta_o" and "cartesian" in wanted:
-            wanted = wanted - {"cartesian"} | {"polar"}
-        return [name for name in VIEWS if name in wanted]
 
 
 def _rounded(drawn: bytes) -> bytes:

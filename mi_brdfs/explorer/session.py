@@ -157,11 +157,10 @@ class Session:
         setting = stages.Setting.of(state)
         for view in sorted(state.views, key=lambda view: view == "picture" and not self._pictures):
             for k, key, given in self._visible(state):
-                depends = (setting, state.exposure) if view == "picture" else VIEWS[view].depends(state)
-                wanted = key, state.component if view != "picture" else None, depends
-                if self._shown.get((view, k)) == wanted:
+                own = (setting, state.exposure) if view == "picture" else (state.component, VIEWS[view].depends(state))
+                if self._shown.get((view, k)) == (key, own):
                     continue
-                self._shown[view, k] = wanted
+                self._shown[view, k] = key, own
                 try:
                     self._draw_one(view, k, given, state, serial)
                 except (StateError, RuntimeError, ValueError) as error:
@@ -170,20 +169,20 @@ class Session:
         return False
 
     def _draw_one(self, view: str, k: int, given: Bsdf, state: State, serial: int) -> None:
-        bsdf = self.materials.expanded(given)
-        if self.scenes.is_new(bsdf, view if view != "picture" else stages.Setting.of(state).quick()):
+        bsdf, setting = self.materials.expanded(given), stages.Setting.of(state)
+        if self.scenes.is_new(bsdf, setting.quick() if view == "picture" else view):
             self.send(text(type="busy", text=f"Compiling {bsdf['type']} …"))
-        if view == "picture":
-            key = key_of(given), stages.Setting.of(state)
-            if self._pictures.get(k, (None,))[0] != key:
-                progress = self.scenes.progress(key[1].quick())
-                with self.materials.loaded(bsdf) as loaded:
-                    progress.advance(loaded)
-                self._pictures[k] = key, progress
-            self._send_picture(k, state, serial)
+        if view != "picture":
+            with self.materials.loaded(bsdf) as loaded:
+                self.send(frame(view, loaded, self.materials.data(bsdf), state, serial, k))
             return
-        with self.materials.loaded(bsdf) as loaded:
-            self.send(frame(view, loaded, self.materials.data(bsdf), state, serial, k))
+        key = key_of(given), setting
+        if self._pictures.get(k, (None,))[0] != key:
+            progress = self.scenes.progress(setting.quick())
+            with self.materials.loaded(bsdf) as loaded:
+                progress.advance(loaded)
+            self._pictures[k] = key, progress
+        self._send_picture(k, state, serial)
 
     def _refine(self, state: State, serial: int) -> bool:
         """Add a pass to the picture that has the fewest."""

@@ -120,14 +120,9 @@ class Stage:
     def __post_init__(self) -> None:
         self.usual = [shape.bsdf() for shape in self.shapes]
         skies = [it for it in self.scene.emitters() if it.class_name() == "EnvironmentMapEmitter"]
-        self._skies = [(it, _matrix(it)) for it in map(mi.traverse, skies)]
+        self.skies = [(it, _matrix(it)) for it in map(mi.traverse, skies)]
         sensor = mi.traverse(self.scene.sensors()[0])
         self._sensor = (sensor, _matrix(sensor)) if "to_world" in sensor else None
-
-    @property
-    def has_sky(self) -> bool:
-        """Whether there is an environment to be turned."""
-        return bool(self._skies)
 
     @cached_property
     def passes(self) -> Any:
@@ -159,7 +154,7 @@ class Stage:
             pivot = place + ahead * ((centre - place) @ ahead)
             around = mi.ScalarTransform4f().translate(pivot).rotate(up, pose.yaw).rotate(right, pose.pitch)
             _put(sensor, around.translate(-pivot), usual)
-        for sky, usual in self._skies:
+        for sky, usual in self.skies:
             _put(sky, mi.ScalarTransform4f().rotate(up, pose.turn), usual)
         if self.light is not None:
             theta, phi = pose.incidence
@@ -265,7 +260,7 @@ def _user_stage(setting: Setting, user: UserScene) -> Stage:
     params["film.crop_offset"] = [0, 0]
     params.update()
     stage = Stage(scene, chosen)
-    user.has_sky = stage.has_sky
+    user.has_sky = bool(stage.skies)
     return stage
 
 

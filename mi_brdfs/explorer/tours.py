@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 STEP = re.compile(
@@ -28,6 +28,5 @@ def parse(name: str, source: str) -> dict[str, Any]:
 @cache
 def tours() -> list[dict[str, Any]]:
     """Return the tours of the pack, in the order of the numbers in their names."""
-    folder = files(__package__) / "tours"
-    found = sorted((it for it in folder.iterdir() if it.name.endswith(".md")), key=lambda it: it.name)
-    return [parse(re.sub(r"^\d+-|\.md$", "", it.name), it.read_text(encoding="utf-8")) for it in found]
+    found = sorted((Path(__file__).parent / "tours").glob("*.md"))
+    return [parse(it.stem.partition("-")[2], it.read_text(encoding="utf-8")) for it in found]
