@@ -6,9 +6,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import get_args
 
-from ..files import FileError, checked
+from ..files import FileError, checked, shortened
 from ..measurement import Measurement, Quantity, representable
-from ..text import shortened
 from . import alta, cornell, csv, lighttools, mbsdf, merl, rgl, utia, zemax
 
 FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, alta, cornell, csv, utia]
