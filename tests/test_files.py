@@ -108,9 +108,9 @@ def ended(*words, **options):
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
 def test_a_full_disk_behind_the_standard_output_gets_a_sentence(tmp_path):
     """And files are written."""
-    target = tmp_path / "x.xml"
+    target = tmp_path / "x.json"
     with open("/dev/full", "w") as full:
-        for words in ("--version",), ("fit", PAINT, *FITTED, "-o", target):
+        for words in ("--version",), ("measured", PAINT, "--json", target):
             told = "mi-brdfs: cannot write to the standard output: No space left on device\n"
             assert ended(*words, stdout=full) == (1, told)
     assert target.is_file()
@@ -354,15 +354,6 @@ def test_pipes_are_refused_wherever_they_are_named(include, tmp_path):
         mi_brdfs.load_legacy("/dev/zero")
 
 
-@pytest.mark.parametrize(("words", "sentence"), [
-    (["room.xml", "-Dtex=coat"], "-D tex=coat: room.xml is a scene of Mitsuba 3, which stays as it is"),
-    (["room.xml", "-o", "parts/room.xml"], "would not find its files there; write it into its own folder"),
-])  # fmt: skip
-def test_scenes_that_are_not_upgraded_stay_where_they_are(words, sentence, room):
-    done = invoke("upgrade", *words)
-    assert done.exit_code == 2 and sentence in done.stderr
-
-
 def test_a_model_that_ends_the_process_ends_no_command_well(tmp_path, as_before):
     (tmp_path / "leaver.py").write_text("import sys\nimport mi_brdfs\nclass Leaver(mi_brdfs.Model):\n    'Leaves.'\n"
                                         "    def lobes(self, p):\n        sys.exit(0)\n")  # fmt: skip
@@ -394,7 +385,9 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def called(monkeypatch, capfdbinary):
-    """Run the command, and return its exit status, its output in bytes, and its messages."""
+    """Run the command, and return its exit status, its output in bytes, and its messages. Pictures are small."""
+    for name, value in ("fit.appearance.SIZE", 48), ("fit.appearance.SAMPLES", 4), ("sweep.wall.SIZE", 16):
+        monkeypatch.setattr(f"mi_brdfs.{name}", value)
 
     def called(*words):
         monkeypatch.setattr(sys, "argv", ["mi-brdfs", *words])

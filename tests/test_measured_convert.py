@@ -7,8 +7,8 @@ from test_cli import invoke
 from test_measured_rows import tabulated
 
 from mi_brdfs.measured import Grid, Measurement, Samples, bake, convert, read
-from mi_brdfs.measured.axis import Axis
 from mi_brdfs.measured.coordinates import Spherical
+from mi_brdfs.measured.grid import Axis
 from mi_brdfs.probe.bsdf import BSDFProbe
 
 import mitsuba as mi  # isort: skip

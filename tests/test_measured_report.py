@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from merl_tables import centres, lowest, write
-from support import ROOT, spherical, traced
+from support import spherical, traced
 from test_cli import invoke
 
 from mi_brdfs import plot
@@ -16,7 +16,6 @@ from mi_brdfs.measured import Axis, FileError, Grid, Measurement, Samples, read,
 from mi_brdfs.measured.coordinates import HalfDifference, SpecularPolar, Spherical
 from mi_brdfs.measured.formats import FORMATS
 from mi_brdfs.measured.report.albedo import albedos, hemisphere
-from mi_brdfs.measured.report.counts import in_one_plane
 from mi_brdfs.measured.report.reciprocity import reciprocity_error
 from mi_brdfs.measured.scattered import as_grid
 from mi_brdfs.observer import to_srgb
@@ -121,11 +120,6 @@ def test_directions_that_are_none_are_refused():
 
 
 # --- The summary ----------------------------------------------------------------------------------------------------
-
-
-def test_data_in_one_plane_are_told():
-    names = {path.name: in_one_plane(read(path).data) for path in (ROOT / "scenes" / "measured").glob("*.bsdf")}
-    assert [name for name, planar in names.items() if planar] == ["aeroglaze_z307.bsdf"] and len(names) == 4
 
 
 def test_counts_are_exact(tmp_path):

@@ -8,7 +8,7 @@ from support import call, context, direction, efficiencies, pairs, shared
 from test_measured_rows import colours, streaks
 
 from mi_brdfs.measured import Samples, read, scattered
-from mi_brdfs.measured.scattered import embedded, gridded, nearest
+from mi_brdfs.measured.scattered import as_grid, embedded, nearest
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ def test_a_smooth_brdf_comes_back(f, anisotropic, gain):
     """Better than from the nearest neighbour; in four dimensions, 2000 samples are few."""
     wi, wo = pairs(2000, 5, 0.05)
     values = f(wi, wo)
-    grid = gridded(Samples(wi, wo, values, anisotropic))
+    grid = as_grid(Samples(wi, wo, values, anisotropic))
     assert np.nanmin(grid.values) >= values.min()
     assert np.nanmax(grid.values) <= values.max()
     wi_2, wo_2 = pairs(1000, 9, 0.2)
@@ -34,7 +34,7 @@ def test_beyond_the_measured_range(monkeypatch):
     wi, wo = pairs(2000, 13, 0.5)
     samples = Samples(wi, wo, colours(wi, wo), False)
     inside, outside = direction(30)[None], direction(80, 60)[None]
-    held, zero = gridded(samples), gridded(samples, "zero")
+    held, zero = as_grid(samples), as_grid(samples, "zero")
     assert np.all(held.evaluate(inside, outside) > 0.05)
     assert np.all(zero.evaluate(inside, outside) == 0)
     assert np.all(zero.evaluate(outside, inside) == 0)
@@ -45,11 +45,11 @@ def test_missing_values_and_few_samples():
     wi, wo = pairs(30, 15, 0.05)
     values = colours(wi, wo)
     values[3] = np.nan
-    assert np.all(gridded(Samples(wi, wo, values, False)).evaluate(wi, wo) > 0.05)
-    one = gridded(Samples(wi[:1], wo[:1], values[:1], False))
+    assert np.all(as_grid(Samples(wi, wo, values, False)).evaluate(wi, wo) > 0.05)
+    one = as_grid(Samples(wi[:1], wo[:1], values[:1], False))
     np.testing.assert_allclose(one.evaluate(wi, wo), np.broadcast_to(values[0], values.shape))
     with pytest.raises(ValueError, match="No sample has a value"):
-        gridded(Samples(wi[3:4], wo[3:4], values[3:4], False))
+        as_grid(Samples(wi[3:4], wo[3:4], values[3:4], False))
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_left_out_samples(parts):
     left, kept = order[::10], np.delete(order, np.s_[::10])
     points = embedded(wi, wo, False)
     neighbour = f[kept][nearest(points[kept], points[left], 1)[:, 0]]
-    grid = gridded(Samples(wi[kept], wo[kept], f[kept], False))
+    grid = as_grid(Samples(wi[kept], wo[kept], f[kept], False))
 
     def error(found):
         return np.sqrt(np.mean(np.log((found + 1e-3) / (f[left] + 1e-3)) ** 2))

@@ -1,10 +1,9 @@
 """Measured BRDFs: files, tables, and what they say."""
 
-from .axis import Axis
 from .conversion import Conversion, bake, convert
 from .files import FileError
 from .formats import read
-from .grid import Grid
+from .grid import Axis, Grid
 from .measurement import Measurement
 from .report.summary import Summary, summarize
 from .scattered import Samples, as_grid

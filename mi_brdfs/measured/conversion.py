@@ -20,7 +20,7 @@ from ..writing import replacing
 from .arrays import NUMPY, components, stacked
 from .coordinates import turned_about_normal
 from .files import named
-from .formats import ENDINGS, FORMATS, read
+from .formats import ENDINGS, read
 from .grid import Grid, usable
 from .measurement import Measurement
 from .report.counts import Range, census, in_one_plane
@@ -204,14 +204,13 @@ def _alike(f: Array, other: Array) -> bool:
 
 def _writer(path: Path, format: str | None) -> ModuleType:
     """Return the module of the format to write, or raise a ValueError."""
-    writable = {it.NAME: it for it in FORMATS if hasattr(it, "write")}
-    fitting = [name for name in ENDINGS.get(path.suffix.lower(), []) if name in writable]
-    chosen = [name for name in fitting if format is None or name.lower() == format.lower()]
+    fitting = ENDINGS.get(path.suffix.lower(), [])
+    chosen = [it for it in fitting if format is None or it.NAME.lower() == format.lower()]
     if not chosen:
         wanted = f"{named(path)} as {format}" if fitting else named(path)
-        known = [f"{ending} ({name})" for ending, names in ENDINGS.items() for name in names if name in writable]
+        known = [f"{ending} ({it.NAME})" for ending, formats in ENDINGS.items() for it in formats]
         raise ValueError(f"there is no way to write {wanted}; files that can be written are {', '.join(known)}")
-    return writable[chosen[0]]
+    return chosen[0]
 
 
 def _compared(source: Source, written: Measurement) -> tuple[float, float, list[str]]:

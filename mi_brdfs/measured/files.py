@@ -1,16 +1,24 @@
-"""Files as bytes: what is read is checked against the file's size first, and every complaint names file and offset."""
+"""Files as bytes and as lines of text. What is read is checked against the file's size first, and no line is held that
+no table would have; every complaint names the file, and the offset or the line."""
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import os
+import re
 import stat
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..parameters.messages import printable
+
+LONGEST = 1 << 20
+"""The characters of a line beyond which a file is no table."""
 
 
 class FileError(ValueError):
@@ -89,3 +97,133 @@ class BinaryFile:
             raise self.error(f"{what} are missing; the file became shorter while it was read")
         self.offset += needed
         return values
+
+
+def _foreign(error: UnicodeError) -> tuple[str, int]:
+    """Take bytes that are not in UTF-8 as Windows' Western letters, which contain those of Latin-1."""
+    assert isinstance(error, UnicodeDecodeError)
+    return error.object[error.start : error.end].decode("cp1252", errors="replace"), error.end
+
+
+FOREIGN = "mi_brdfs.foreign"
+codecs.register_error(FOREIGN, _foreign)
+
+
+class TextFile:
+    """Reads a text file line by line, in UTF-8, UTF-16 with its mark, or Latin-1, with any line ends."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.line = path, 0
+        self.comments: list[str] = []
+        self.row_lines = array("q")
+        with path.open("rb") as file:
+            self._encoding = encoding(file.read(4))
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines, without the white space around them; ``line`` is the number of the last one, from 1."""
+        with self.path.open(encoding=self._encoding, errors=FOREIGN) as file:
+            while text := file.readline(LONGEST):
+                self.line += 1
+                if len(text) == LONGEST:
+                    raise self.error(f"there are more than {LONGEST:,} characters: this is no table")
+                yield text.strip()
+
+    def content(self) -> Iterator[str]:
+        """Yield what lines have beside comments, where they have anything, and collect the comments."""
+        for text in self.lines():
+            text, _, comment = text.partition("#")
+            if comment := comment.strip("# \t"):
+                self.comments.append(comment)
+            if text := text.strip():
+                yield text
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the words of lines, between white space and commas."""
+        return filter(None, (text.replace(",", " ").split() for text in self.content()))
+
+    def error(self, problem: str, line: int | None = None) -> FileError:
+        return FileError(f"{self.path}: in line {self.line if line is None else line}, {problem}.")
+
+    def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
+        """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
+        try:
+            return list(map(float, words))
+        except ValueError:
+            bad = next(word for word in words if not is_number(word))
+            raise self.error(f"{shortened(bad)} should be {what}") from None
+
+    def table(self, rows: Iterable[Sequence[str]], columns: int, what: str, more: bool = False) -> np.ndarray:
+        """Return rows of words as numbers, shape (rows, columns); with ``more``, further columns are left out.
+        ``row_lines`` has the line of each. Raise a FileError if a row has fewer numbers or more, or there is no row;
+        ``what`` says what columns are."""
+        numbers = array("d")
+        self.row_lines = array("q")
+        for words in rows:
+            if not words:
+                continue
+            if len(words) < columns or (len(words) > columns and not more):
+                raise self.error(f"there are {len(words)} numbers, but should be {columns}: {what}")
+            numbers.extend(self.numbers(words[:columns]))
+            self.row_lines.append(self.line)
+        if not numbers:
+            raise self.error("the file ends without a row of numbers")
+        return np.frombuffer(numbers).reshape(-1, columns)
+
+    def list_of(self, rows: Iterable[Sequence[str]], count: int, what: str, each: str) -> np.ndarray:
+        """Return as many numbers as are announced, from as many rows as they fill. Raise a FileError if there are fewer
+        or more; ``what`` says in plural what they are, and ``each`` what one is."""
+        found: list[float] = []
+        for row in rows:
+            found += self.numbers(row, each)
+            if len(found) > count:
+                raise self.error(f"there are {len(found)} {what}, but {count} were announced")
+            if len(found) == count:
+                return np.array(found)
+        raise self.error(f"the file ends after {len(found)} of {count} {what}")
+
+    def stated(self, *names: str) -> str:
+        """Return what a comment ``name: …`` or ``name = …`` says, of the first pattern of names that has one."""
+        for name in names:
+            for comment in self.comments:
+                if match := re.match(rf"(?i){name}\s*[:=]\s*(\S.*)", comment):
+                    return match[1]
+        return ""
+
+
+def encoding(head: bytes) -> str:
+    """Return the encoding that the first bytes of a text file show."""
+    return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
+
+
+def decoded(data: bytes) -> str:
+    """Return the text of bytes, those of a text file from its start on or a name in a binary one."""
+    return data.decode(encoding(data[:4]), errors=FOREIGN)
+
+
+def is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def whole(word: str) -> int:
+    """Return a count, 0 if a word is none or has more than nine digits."""
+    return int(word) if word.isdecimal() and len(word) < 10 else 0
+
+
+def shortened(word: str) -> str:
+    """Return a word as it can be quoted in a sentence."""
+    return repr(word if len(word) <= 24 else word[:20] + "…")
+
+
+def opening(head: bytes) -> list[str]:
+    """Return the first lines of a text file, in small letters."""
+    return [line.strip().lower() for line in decoded(head).splitlines()]
+
+
+def first_words(lines: list[str]) -> list[str]:
+    """Return the words of the first line that is no comment."""
+    words = (line.partition("#")[0].replace(",", " ").split() for line in lines)
+    return next(filter(None, words), [])

@@ -80,20 +80,17 @@ def representable(measurement: Measurement) -> Measurement:
     if nm is not None and nm[-1] < LEAST_NM:
         numbers = f"{nm[0]:g} to {nm[-1]:g}" if len(nm) > 1 else f"{nm[0]:g}"
         raise FileError(f"{measurement.path}: wavelengths of {numbers} look like micrometres; write nm.")
-    if nm is not None and len(nm) > 1 and (share := _unseen(nm[0], nm[-1])) > MOST_UNSEEN:
-        warnings.warn(
-            f"{measurement.path}: its wavelengths of {nm[0]:g} to {nm[-1]:g} nm leave out {share:.0%} of what the eye "
-            "sees; there, the value of the nearest one is shown.", stacklevel=2,
-        )  # fmt: skip
+    if nm is not None and len(nm) > 1:
+        fine, weights = observer()
+        unseen = float(luminance(weights)[(fine < nm[0]) | (fine > nm[-1])].sum())
+        if unseen > MOST_UNSEEN:
+            warnings.warn(
+                f"{measurement.path}: its wavelengths of {nm[0]:g} to {nm[-1]:g} nm leave out {unseen:.0%} of what the "
+                "eye sees; there, the value of the nearest one is shown.", stacklevel=2,
+            )  # fmt: skip
     values[~((values >= -MOST) & (values <= MOST))] = np.nan
     # Samples with a missing channel are left out where others are interpolated.
     kept = values if isinstance(measurement.data, Grid) else values[np.isfinite(values).all(axis=1)]
     if not np.any(kept > np.finfo(np.float32).tiny):
         raise FileError(f"{measurement.path}: no value is positive and at most {MOST:g}; there is nothing to render.")
     return measurement
-
-
-def _unseen(low: float, high: float) -> float:
-    """Return the share of a white reflectance's luminance that lies below or above two wavelengths in nm."""
-    fine, weights = observer()
-    return float(luminance(weights)[(fine < low) | (fine > high)].sum())

@@ -12,12 +12,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .arrays import stacked
-from .axis import Axis
 from .coordinates import TWO_PI, Spherical, spherical, wrapped
-from .grid import Grid
+from .files import TextFile
+from .grid import Axis, Grid
 from .measurement import Measurement
 from .scattered import Samples
-from .text import TextFile
 
 Angles: TypeAlias = Sequence[np.ndarray]
 SAME = 1e-6
@@ -38,19 +37,15 @@ def measured(
     """Return the rows of a file, of values of shape (N, channels), as a measurement, with what else is ``said`` of it.
     Values of f cosθ are divided by the cosine. Raise a FileError for angles that no direction above the surface has."""
     for name, column, most in zip("θφθφ", angles, (90, 720, 90, 720), strict=True):
-        _check(file, name, column, most)
+        good = abs(column) <= math.radians(most) + SAME
+        if not np.all(good):
+            k = int(np.argmin(good))
+            angle = math.degrees(column[k])
+            raise file.error(f"{name} is {angle:.4g}°; it must be from -{most}° to {most}°", file.row_lines[k])
     if said.get("quantity") == "f cos":
         values = without_cosine(values, np.cos(angles[2]))
     said["material"] = said.get("material") or file.path.stem
     return Measurement(file.path, format, arranged(angles, values), wavelengths, **said)
-
-
-def _check(file: TextFile, name: str, angles: np.ndarray, most: int) -> None:
-    good = abs(angles) <= math.radians(most) + SAME
-    if not np.all(good):
-        k = int(np.argmin(good))
-        found = math.degrees(angles[k])
-        raise file.error(f"{name} is {found:.4g}°; it must be from -{most}° to {most}°", file.row_lines[k])
 
 
 def arranged(angles: Angles, values: np.ndarray) -> Grid | Samples:

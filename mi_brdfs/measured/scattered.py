@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from .arrays import NUMPY, components, stacked
-from .axis import Axis
 from .coordinates import HalfDifference, polar_angle
-from .grid import Extrapolation, Grid
+from .grid import Axis, Extrapolation, Grid
 
 THINNEST = np.radians(6)
 """Half of the least range of angles that counts as measured."""
@@ -72,12 +71,8 @@ class Samples:
 
 
 def as_grid(data: Grid | Samples, extrapolate: Extrapolation = "hold") -> Grid:
-    """Return measured values on a grid, which has ``evaluate``: their own, or for samples that of :func:`gridded`."""
-    return data if isinstance(data, Grid) else gridded(data, extrapolate)
-
-
-def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
-    """Return samples as a grid of half and difference angles, in which highlights stay in place.
+    """Return measured values on a grid, which has ``evaluate``: their own, or for samples one of half and difference
+    angles, in which highlights stay in place.
 
     Each node has a mean of the ten nearest samples, with weights that are positive and sum to one, so that nothing
     rings: they are those of Franke and Little (R. Franke, Scattered data interpolation, Math. Comp. 38, 1982,
@@ -93,21 +88,23 @@ def gridded(samples: Samples, extrapolate: Extrapolation = "hold") -> Grid:
     Raises:
         ValueError: if no sample has a value.
     """
-    known = samples.known
+    if isinstance(data, Grid):
+        return data
+    known = data.known
     if not np.any(known):
         raise ValueError("No sample has a value.")
-    wi, wo, anisotropic = samples.wi[known], samples.wo[known], samples.anisotropic
-    points, values = merged(embedded(wi, wo, anisotropic), samples.values[known])
+    wi, wo, anisotropic = data.wi[known], data.wo[known], data.anisotropic
+    points, values = merged(embedded(wi, wo, anisotropic), data.values[known])
     coordinates = HalfDifference(reciprocal=True, anisotropic=anisotropic)
     places = coordinates.locate(components(wi), components(wo), NUMPY)
     size = min(np.clip(NODES_PER_SAMPLE * len(points), LEAST_NODES, MOST_NODES), MOST_VALUES // values.shape[1])
-    axes = spaced(places, np.maximum(samples.values[known], 0).sum(axis=1), size)
+    axes = spaced(places, np.maximum(data.values[known], 0).sum(axis=1), size)
     half = len(axes[2].nodes) // 2 + 1
     # Isotropic tables are symmetric about φd = π/2.
     counted = [axis.nodes if k != 2 or anisotropic else axis.nodes[:half] for k, axis in enumerate(axes)]
     light, view = coordinates.directions(*np.meshgrid(*counted, indexing="ij"))
     pairs = stacked(light), stacked(view)
-    asked = samples.measured(*pairs) if extrapolate == "zero" else (light.z > 0) & (view.z > 0)
+    asked = data.measured(*pairs) if extrapolate == "zero" else (light.z > 0) & (view.z > 0)
     nodes = embedded(pairs[0][asked], pairs[1][asked], anisotropic)
     table = np.full((*asked.shape, values.shape[1]), np.nan)
     table[asked] = interpolated(points, values, nodes)
@@ -205,7 +202,7 @@ def nearest(points: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
 
 
 def weights(offsets: np.ndarray) -> np.ndarray:
-    """Return weights for points at offsets from a node, shape (nodes, points, dimensions): see :func:`gridded`."""
+    """Return weights for points at offsets from a node, shape (nodes, points, dimensions): see :func:`as_grid`."""
     distance = np.maximum(np.sqrt(np.sum(offsets**2, axis=-1)), 1e-9)
     radius = np.max(distance, axis=1, keepdims=True) * 1.0001
     start = 2 * np.log((radius - distance) / (radius * distance))

@@ -9,7 +9,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from .axis import Axis, corners
+from .grid import Axis, corners
 
 
 class Warp:

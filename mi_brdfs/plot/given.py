@@ -19,8 +19,6 @@ from ..probe.sources import measured_file, name_of
 from ..variants import is_measurable
 from .style import CHANNELS, Place, plain
 
-SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
-
 
 class Named(NamedTuple):
     """A BSDF and its name in the legend."""
@@ -47,13 +45,6 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
     return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
-
-
-def scales_of(scale: str) -> tuple[str, ...]:
-    """Return the scales to draw: linear, log, or both."""
-    if scale not in SCALES:
-        raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
-    return SCALES[scale]
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:

@@ -19,9 +19,10 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import Named, by_channel, constants, named, places, quantity, scales_of, with_smooth_part
+from .given import Named, by_channel, constants, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, Place, incidence, look
 
+SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
 MIRROR = {"marker": "v", "markersize": 5}
 THIN = {"linewidth": 0.8}
 COLUMNS, NARROWEST = 4, 2.8
@@ -118,7 +119,9 @@ def _planar(
     """Draw a row of panels for the BSDF or for each angle, and a column for each scale; side by side, a column for each
     BSDF and a row for each scale. ``heights`` are those of a panel of width 1, without and with transmission."""
     angles = angles_of_incidence(angles)
-    scales = scales_of(scale)
+    if scale not in SCALES:
+        raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
+    scales = SCALES[scale]
     found = with_smooth_part(named(bsdfs, labels))
     whole = any(lobes.transmits(it.probe) for it in found)
     beside = side_by_side and len(found) > 1

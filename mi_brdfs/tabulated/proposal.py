@@ -8,9 +8,8 @@ import numpy as np
 
 from ..math import choose, normalize_or, select
 from ..measured.arrays import DRJIT, stacked, vector
-from ..measured.axis import Interpolation
 from ..measured.coordinates import TWO_PI, polar_angle, spherical, wrapped
-from ..measured.grid import Extrapolation, Grid
+from ..measured.grid import Extrapolation, Grid, Interpolation
 
 COSINE_SHARE = 0.02
 """The share of directions drawn in proportion to the cosine, wherever the table is zero or coarser than its nodes."""

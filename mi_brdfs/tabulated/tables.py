@@ -15,11 +15,10 @@ import numpy as np
 
 from ..math import clamp
 from ..measured.arrays import DRJIT
-from ..measured.axis import Axis, Interpolation, corners
 from ..measured.coordinates import Coordinates
 from ..measured.files import checked, content_hash
 from ..measured.formats import read
-from ..measured.grid import Extrapolation, Grid
+from ..measured.grid import Axis, Extrapolation, Grid, Interpolation, corners
 from ..measured.measurement import Measurement, Quantity
 from ..measured.report.albedo import albedos
 from ..measured.scattered import as_grid

@@ -6,19 +6,18 @@ from pathlib import Path
 from types import ModuleType
 from typing import get_args
 
-from ..files import FileError, checked
+from ..files import FileError, checked, shortened
 from ..measurement import Measurement, Quantity, representable
-from ..text import shortened
 from . import alta, cornell, csv, lighttools, mbsdf, merl, rgl, utia, zemax
 
 FORMATS: list[ModuleType] = [merl, rgl, mbsdf, zemax, lighttools, alta, cornell, csv, utia]
 """Modules with ``NAME``, ``DESCRIPTION`` (what its files look like, in one sentence), ``recognizes(path, head)``, where
 ``head`` are the first bytes, and ``read(path)``; the first that recognizes a file reads it. Those that can be written
-have ``write(path, source)``."""
+(``ENDINGS``) have ``write(path, source)``."""
 UNSTATED = alta, csv, utia
 """Those whose files need not state whether they hold f or f cosθo: ``read(path, quantity)`` is told."""
-ENDINGS = {".binary": ["MERL"], ".bsdf": ["RGL", "Zemax"], ".csv": ["CSV"]}
-"""Of files that are written, with the names of the formats: the first one by default."""
+ENDINGS = {".binary": [merl], ".bsdf": [rgl, zemax], ".csv": [csv]}
+"""Of files that are written, with their formats: the first one by default."""
 
 HEAD = 1 << 16
 """The bytes by which formats are told apart: as many as a long comment may take, and the first line behind it."""

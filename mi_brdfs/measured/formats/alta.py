@@ -13,10 +13,9 @@ import numpy as np
 
 from ..arrays import vector
 from ..coordinates import HalfDifference, SpecularPolar, polar_angle, spherical
-from ..files import FileError
+from ..files import FileError, TextFile, opening, shortened, whole
 from ..measurement import Measurement, Quantity
 from ..rows import SAME, measured
-from ..text import TextFile, opening, shortened, whole
 from .tabular import srgb_of
 
 NAME = "ALTA"
@@ -63,7 +62,7 @@ def read(path: Path, quantity: Quantity) -> Measurement:
             "a coordinate is infinite or missing, or a direction is the zero vector",
             file.row_lines[int(np.argmax(unknown))],
         )
-    if name in HALF:
+    if name.startswith("RUSIN"):  # whose grids reach below the horizon
         table = _above_horizon(path, table, np.minimum(light.z, view.z))
         light, view = directions(*table[:, :inputs].T)
     if name == SPHERICAL:  # whose azimuths count at the normal, too, where they fill a grid
@@ -167,5 +166,3 @@ PARAMETRISATIONS: dict[str, tuple[int, Callable[..., Pair], bool]] = {
     "CARTESIAN": (6, cartesian, True),
 }
 """ALTA's names: how many columns they have, ``(L, V)`` of these, and whether f depends on the azimuth of both."""
-HALF = "RUSIN_TH_TD_PD", "RUSIN_TH_PH_TD_PD"
-"""Those whose grids reach below the horizon."""

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..files import TextFile, first_words, is_number, opening, whole
 from ..measurement import Measurement
 from ..rows import measured
-from ..text import TextFile, first_words, is_number, opening, whole
 
 NAME = "Cornell"
 DESCRIPTION = "text: the number of wavelengths, these in nm, then rows of θi, φi, θo, φo and a spectrum"

@@ -14,10 +14,10 @@ import numpy as np
 from ...parameters.messages import brief
 from ..arrays import stacked
 from ..coordinates import spherical
+from ..files import TextFile, opening, shortened
 from ..measurement import Measurement, Quantity
 from ..rows import measured
 from ..source import Source
-from ..text import TextFile, opening, shortened
 
 NAME = "CSV"
 DESCRIPTION = "a header with theta_i_deg, theta_o_deg, phi_o_deg (or _rad) and f, or r, g, b, or wavelengths in nm"

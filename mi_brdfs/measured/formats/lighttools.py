@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..coordinates import Spherical
-from ..files import FileError
+from ..files import FileError, opening
 from ..grid import Grid
 from ..measurement import Measurement
-from ..text import opening
 from .tabular import Table, has_incidence_lines, is_table, srgb_of
 
 NAME = "LightTools"

@@ -18,12 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..axis import Axis
 from ..coordinates import Spherical
-from ..files import BinaryFile
-from ..grid import Grid
+from ..files import BinaryFile, decoded
+from ..grid import Axis, Grid
 from ..measurement import Measurement
-from ..text import decoded
 from .merl import centres
 
 NAME = "MBSDF"

@@ -27,10 +27,9 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import stacked
-from ..axis import Axis
 from ..coordinates import HalfDifference
 from ..files import BinaryFile
-from ..grid import Grid
+from ..grid import Axis, Grid
 from ..measurement import Measurement
 from ..source import Source
 

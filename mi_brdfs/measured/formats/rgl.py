@@ -15,12 +15,10 @@ from ...parameters.messages import brief
 from ..adaptation import LAST, adapted, brightness, turned
 from ..adaptive import Adaptive
 from ..arrays import NUMPY, components, stacked
-from ..axis import Axis
-from ..files import BinaryFile, FileError
-from ..grid import Grid
+from ..files import BinaryFile, FileError, decoded, shortened
+from ..grid import Axis, Grid
 from ..measurement import Measurement
 from ..source import Source
-from ..text import decoded, shortened
 
 NAME = "RGL"
 DESCRIPTION = "the words 'tensor_file', then named arrays"

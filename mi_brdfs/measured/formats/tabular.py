@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...parameters.messages import listed
-from ..axis import Axis
 from ..coordinates import TWO_PI, wrapped
-from ..files import FileError
+from ..files import FileError, TextFile, first_words, is_number, shortened, whole
+from ..grid import Axis
 from ..rows import sector_start
-from ..text import TextFile, first_words, is_number, shortened, whole
 
 WORDS = ("Source", "Symmetry", "SpectralContent", "ScatterType")
 ANGLES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")

@@ -21,10 +21,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..axis import Axis
 from ..coordinates import TWO_PI, Spherical
 from ..files import BinaryFile
-from ..grid import Grid
+from ..grid import Axis, Grid
 from ..measurement import Measurement, Quantity
 
 NAME = "UTIA"
@@ -44,14 +43,13 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     for dtype in (np.dtype("f8"), np.dtype("f4")):
         theta = isqrt(isqrt(file.left // (3 * dtype.itemsize)) // RATIO)
         if theta and 3 * (theta * RATIO * theta) ** 2 * dtype.itemsize == file.left:
-            return _read(file, dtype, theta, RATIO * theta, quantity)
-    raise file.error(
-        f"the {file.left:,} bytes are not three planes of n × n numbers, where n is 288, 6 polar angles times 48 "
-        "azimuths, or another number of polar angles times 8 times as many azimuths"
-    )
-
-
-def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int, quantity: Quantity) -> Measurement:
+            break
+    else:
+        raise file.error(
+            f"the {file.left:,} bytes are not three planes of n × n numbers, where n is 288, 6 polar angles times 48 "
+            "azimuths, or another number of polar angles times 8 times as many azimuths"
+        )
+    phi = RATIO * theta
     planes = file.take(dtype, 3 * (theta * phi) ** 2, "values").reshape(3, theta, phi, theta, phi)
     if np.max(np.abs(planes), where=np.isfinite(planes), initial=0) > LARGEST:
         raise file.error(
@@ -70,4 +68,4 @@ def _read(file: BinaryFile, dtype: np.dtype, theta: int, phi: int, quantity: Qua
     grid = Grid(Spherical(mirrored=False, anisotropic=True), (polar, polar, azimuth, azimuth), values)
     held: Literal["f", "f cos"] = "f" if quantity == "stated" else quantity
     notes = {"scale": f"taken as {held} in linear sRGB, which the file does not say"}
-    return Measurement(file.path, NAME, grid, material=file.path.stem, quantity=held, notes=notes)
+    return Measurement(path, NAME, grid, material=path.stem, quantity=held, notes=notes)

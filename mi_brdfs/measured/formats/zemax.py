@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import stacked
-from ..axis import Axis
 from ..coordinates import TWO_PI, SpecularPolar
-from ..grid import Grid
+from ..files import opening
+from ..grid import Axis, Grid
 from ..measurement import Measurement
 from ..report.albedo import hemisphere
 from ..rows import warn_of_a_sector
 from ..source import Source
-from ..text import opening
 from .tabular import ANGLES, CHANNELS, XYZ_TO_SRGB, Table, has_incidence_lines, is_table, srgb_of
 
 NAME = "Zemax"

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..axis import Axis
 from ..files import FileError, named
-from ..grid import Grid
+from ..grid import Axis, Grid
 from ..measurement import Measurement
 from ..scattered import Samples, as_grid
 from .albedo import albedos, coverage
