@@ -23,7 +23,7 @@ from mi_brdfs.probe.arrays import interaction, vectors
 from mi_brdfs.probe.sources import find_sources, shared, split
 from mi_brdfs.testing import assert_bsdf
 from mi_brdfs.validation import Finding, Report, check, compare
-from mi_brdfs.validation.formats import block, junit
+from mi_brdfs.validation.report import block, junit
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 

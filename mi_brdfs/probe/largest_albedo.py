@@ -1,8 +1,8 @@
 """The largest directional albedo of a model: a search over the direction of view and all of its free numbers.
 
-A setting is a point of the unit cube, with a side for each axis (:mod:`.settings`). The search takes the brightest of
-a Latin hypercube of points, and climbs from each by steps that shrink. Free numbers are textures with a value for each
-lane, so that one kernel evaluates thousands of settings.
+A setting is a point of the unit cube, with a side for each axis (:mod:`.parameter_space`). The search takes the
+brightest of a Latin hypercube of points, and climbs from each by steps that shrink. Free numbers are textures with a
+value for each lane, so that one kernel evaluates thousands of settings.
 """
 
 from __future__ import annotations
