@@ -255,11 +255,18 @@ RIGHT = {
 }
 
 
+def look_at_few_directions(monkeypatch):
+    """Of those at random, beside the angles that are asked for: a suspect one takes up to a second."""
+    monkeypatch.setattr(run_of_checks, "random_incidents", lambda part, count: random_incidents(part, count // 4))
+
+
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name == "lambert" else pytest.mark.slow) for name in RIGHT]
 )
-def test_what_is_right_passes(name):
+def test_what_is_right_passes(name, monkeypatch):
     """The models that the mutants are made of among them."""
+    if name != "lambert":
+        look_at_few_directions(monkeypatch)
     report = check(RIGHT[name], name=name, angles=ANGLES if name == "lambert" else 60)
     assert report.passed, report
     assert {finding.check for finding in report.findings} == set(CHECKS)
@@ -267,11 +274,6 @@ def test_what_is_right_passes(name):
     skipped = {"reciprocity", "albedo", "efficiency", "textures", "gradients", "recompiles", "reflectance", "spectral"}
     skipped |= {"null", "deltas", "updates", "colours"}
     assert judged >= set(CHECKS) - skipped
-
-
-def look_at_few_directions(monkeypatch):
-    """Of those at random, beside the angles that are asked for: a suspect one takes up to a second."""
-    monkeypatch.setattr(run_of_checks, "random_incidents", lambda part, count: random_incidents(part, count // 4))
 
 
 def case(only, plugin, angles=ANGLES, **given):
