@@ -629,7 +629,7 @@ def wrapped(name, given, **methods):
         return lambda self, *given: change(getattr(inner, name), *given)
 
     kinds = map(inner.flags, range(inner.component_count()))
-    return stranger(name, *kinds, **{each: method(each) for each in ("sample", "eval", "pdf", "eval_pdf")})
+    return stranger(name, *kinds, **{each: method(each) for each in {"sample", "eval", "pdf", "eval_pdf", *methods}})
 
 
 def mirrored(ctx, si, active):
@@ -639,17 +639,6 @@ def mirrored(ctx, si, active):
     lit = active & (si.wi.z > 0) & ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0)
     bs.pdf, bs.sampled_component = dr.select(lit, mi.Float(1), 0), mi.UInt32(0)
     return bs, lit
-
-
-def half_of_the_mirror():
-    """The dict of a copy of Mitsuba's plastic, whose mirror is drawn half of the time and weighted as if always."""
-
-    def sample(own, ctx, *given):
-        bs, weight = own(ctx, *given)
-        alone = ctx.component == 0
-        return bs, weight * dr.select((bs.sampled_component == 0) & (not alone), bs.pdf, 1)
-
-    return wrapped("half_of_the_mirror", {"type": "plastic"}, sample=sample)
 
 
 def ignored_mode(own, self, ctx, si, active):

@@ -10,9 +10,8 @@ from reference_albedos import REFERENCES
 from support import direction
 
 from mi_brdfs.mitsuba.registry import brought_terms, own_models
-from mi_brdfs.probe.largest_albedo import albedos, default_albedo, largest_albedo
+from mi_brdfs.probe.largest_albedo import albedos, default_albedo, fault, largest_albedo
 from mi_brdfs.probe.parameter_space import choices, white
-from mi_brdfs.probe.stated_energy import fault
 
 PLUGINS = {model: model.plugins[0] for model in own_models()}
 FEW = "eon", "ward", "burley"

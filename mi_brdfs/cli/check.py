@@ -13,17 +13,21 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from multiprocessing import active_children, connection, get_context, parent_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import mitsuba as mi
 import typer
 
+from .. import validation
+from ..given import angles_of_incidence
 from ..mitsuba import guests
 from ..mitsuba.registry import all_models
 from ..model import EnergyWarning
 from ..parameters.messages import printable
+from ..probe.sources import BSDFSource, degrees_of
 from ..starting import signals_held
-from ..validation import CHECKS
+from ..validation import CHECKS, compare
+from ..validation.report import Report, block, junit
 from .app import command, imported
 from .options import (
     PAGES,
@@ -40,10 +44,6 @@ from .options import (
     write_text,
 )
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
-
-if TYPE_CHECKING:
-    from ..probe.sources import BSDFSource
-    from ..validation import Report
 
 
 @command(
@@ -113,10 +113,12 @@ def check(
     if html_file is not None:
         write_text(html_file, page(reports, again))
     if junit_file is not None:
-        from ..validation.formats import junit
-
         write_text(junit_file, junit(reports))
-    _print_reports(reports, again)
+    for report, command_line in zip(reports, again, strict=True):
+        for line, style in block(report, out.width):
+            out.print(line, style=style)
+        if command_line:
+            out.print(printable(f"    Again: {command_line}"))
     err.print(f"{len(reports)} checked in {time.perf_counter() - start:.1f} s, {chosen}.")
     if any(report.failures for report in reports):
         raise typer.Exit(Exit.ERROR)
@@ -126,9 +128,6 @@ def check(
 
 def _options(angles: str | None, significance: float | None) -> dict[str, Any]:
     """Return the arguments that are given."""
-    from ..given import angles_of_incidence
-    from ..probe.sources import degrees_of
-
     options: dict[str, Any] = {}
     if angles is not None:
         with failing(Exit.USAGE, ValueError, about="--angles"):
@@ -175,10 +174,8 @@ def _check_one(
     source: BSDFSource, other: BSDFSource | None, options: dict[str, Any], on_progress: Any = lambda: None
 ) -> Report:
     """Return the report on a BSDF in the active variant: on the checks, or on how it compares with another."""
-    from ..validation import check, compare
-
     if other is None:
-        return check(source.load(), name=source.name, on_progress=on_progress, **options)
+        return validation.check(source.load(), name=source.name, on_progress=on_progress, **options)
     report = compare(source.load(), other.load(), name=source.name, other_name=other.name, **options)
     on_progress()
     return report
@@ -200,17 +197,6 @@ def _end_with_parent() -> None:
     assert parent
     connection.wait([parent.sentinel])
     os._exit(Exit.ERROR)
-
-
-def _print_reports(reports: list[Report], again: list[str]) -> None:
-    """Print a block for each report, with the command that makes its failing checks again."""
-    from ..validation.formats import block
-
-    for report, words in zip(reports, again, strict=True):
-        for line, style in block(report, out.width):
-            out.print(line, style=style)
-        if words:
-            out.print(printable(f"    Again: {words}"))
 
 
 def _again(source: BSDFSource, report: Report, options: dict[str, Any]) -> str:

@@ -67,8 +67,7 @@ def energy(
 
 
 def _measure_all(models: list[type[Model]]) -> list[Measured]:
-    from ..probe.largest_albedo import default_albedo, largest_albedo
-    from ..probe.stated_energy import configurations
+    from ..probe.largest_albedo import configurations, default_albedo, largest_albedo
 
     measured = []
     todo = {}
@@ -89,7 +88,7 @@ def _measure_all(models: list[type[Model]]) -> list[Measured]:
 
 def _print_statements(measured: list[Measured]) -> None:
     """Print the table of the manual page for each model, and the statement."""
-    from ..probe.stated_energy import energy_of
+    from ..probe.largest_albedo import energy_of
 
     for model, default, found in measured:
         stated = energy_of(model, default, found)
@@ -104,7 +103,7 @@ def _print_statements(measured: list[Measured]) -> None:
 
 def _write(measured: list[Measured]) -> None:
     """Write the data file of the pack's own models, with what was found in place of what it says of these."""
-    from ..probe.stated_energy import energy_of
+    from ..probe.largest_albedo import energy_of
 
     stated = {model.plugins[0]: model.energy for model in own_models() if model.energy}
     stated |= {it.model.plugins[0]: energy_of(*it) for it in measured if is_own(it.model)}
@@ -114,7 +113,7 @@ def _write(measured: list[Measured]) -> None:
 
 def _print_comparison(measured: list[Measured]) -> bool:
     """Print a row for each configuration, and below what is wrong. Return whether anything is."""
-    from ..probe.stated_energy import fault
+    from ..probe.largest_albedo import fault
 
     table = Table("type", "configuration", "stated", "found", "", box=None, pad_edge=False)
     faults = []

@@ -71,22 +71,18 @@ def hero_wavelengths(count: int) -> Array:
     return (VISIBLE[0] + np.diff(VISIBLE) * ((first + np.arange(4) / 4) % 1)).astype(np.float32)
 
 
+def texture(**methods: Callable[..., Any]) -> mi.Texture:
+    """Return a texture that has some methods, whose first argument is the texture itself."""
+    return type("Made", (mi.Texture,), methods)(mi.Properties())
+
+
 def per_lane() -> mi.Texture:
     """Return a texture whose ``value``, a float or a colour, may differ from lane to lane."""
 
-    class Lanes(mi.Texture):
-        value: Any
+    def evaluated(self: Any, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+        return self.value
 
-        def __init__(self) -> None:
-            super().__init__(mi.Properties())
-
-        def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            return self.value
-
-        def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            return self.value
-
-    return Lanes()
+    return texture(eval=evaluated, eval_1=evaluated)
 
 
 @contextmanager
@@ -102,27 +98,26 @@ def held(textures: Mapping[str, mi.Texture], values: Mapping[str, Any]) -> Itera
             texture.value = type(values[name])(0)
 
 
-def pinned(texture: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None = None) -> mi.Texture:
+def pinned(varying: mi.Texture, si: mi.SurfaceInteraction3f, channel: int | None = None) -> mi.Texture:
     """Return a texture that has, whatever it is asked for, the values of another one at ``si``, lane by lane; as a
     colour, grey of one channel if that is given."""
 
     def at(method: str, of: int | None = None) -> Callable[..., Any]:
         def evaluated(self: mi.Texture, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            value = getattr(texture, method)(si, active)
+            value = getattr(varying, method)(si, active)
             return value if of is None else type(value)(value[of])
 
         return evaluated
 
-    members = {
-        "eval": at("eval", channel),
-        "eval_1": at("eval_1"),
-        "eval_1_grad": at("eval_1_grad"),
-        "eval_3": at("eval_3", channel),
-        "mean": lambda self: 0.5 * texture.mean(),  # samplers may be guided by it, but values that follow it show
-        "max": lambda self: texture.max(),
-        "is_spatially_varying": lambda self: True,
-    }
-    return type("Pinned", (mi.Texture,), members)(mi.Properties())
+    return texture(
+        eval=at("eval", channel),
+        eval_1=at("eval_1"),
+        eval_1_grad=at("eval_1_grad"),
+        eval_3=at("eval_3", channel),
+        mean=lambda self: 0.5 * varying.mean(),  # samplers may be guided by it, but values that follow it show
+        max=lambda self: varying.max(),
+        is_spatially_varying=lambda self: True,
+    )
 
 
 def numbers(value: Any, count: int | None = None) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
-from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned
+from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, texture
 from ..probe.bsdf import BSDFProbe, Part, Value, load
 from ..probe.directions import hemisphere, on_side
 from . import contract, sampling, values
@@ -166,7 +166,8 @@ def _check_followed(outcome: Outcome, it: Value, grey: list[Array], wi: Array) -
     for k, own in enumerate(grey):
         got, expected = it.value[:, k], own[:, k]
         channel = ("red", "green", "blue")[k] if mi.is_rgb else f"the {('1st', '2nd', '3rd', '4th')[k]} wavelength"
-        errors = [_error(got, other[:, k]) for other in grey]
+        # What 99 in 100 do not exceed.
+        errors = [np.quantile(relative(got, other[:, k], 1e-6), 0.99) for other in grey]
         if errors[k] > TOLERANCE and min(errors) < 0.5 * errors[k]:
             name, why = f"{it.name} in {channel}", f"{OWN}: it follows another channel"
             outcome.wrong(abs(got - expected), name, got, why, wi, it.wo, expected=expected)
@@ -181,29 +182,16 @@ def _compare(
     )
 
 
-def _error(got: Array, expected: Array) -> float:
-    """Return the relative error that 99 in 100 values do not exceed."""
-    return float(np.quantile(relative(got, expected, 1e-6), 0.99))
-
-
 def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
     """Return the colours among constant parameters, what is asked for a spectrum, by name, and how bright they are."""
     params, asked = mi.traverse(probe.bsdf), set[str]()
 
-    class Asking(mi.Texture):
-        def __init__(self, name: str, value: Any) -> None:
-            super().__init__(mi.Properties())
-            self.name, self.value = name, value
+    def asking(name: str, grey: float) -> mi.Texture:
+        def evaluated(self: mi.Texture, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
+            asked.add(name)
+            return mi.UnpolarizedSpectrum(grey)
 
-        def eval(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            asked.add(self.name)
-            return mi.UnpolarizedSpectrum(self.value)
-
-        def eval_1(self, _: mi.SurfaceInteraction3f, active: mi.Bool = True) -> Any:
-            return mi.Float(self.value)
-
-        def mean(self) -> Any:
-            return mi.Float(self.value)
+        return texture(eval=evaluated, eval_1=lambda self, *_: mi.Float(grey), mean=lambda self: mi.Float(grey))
 
     greys = {}
     for key in params.keys():
@@ -212,9 +200,9 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
             greys[name] = float(f"{numbers(params[key], 1).mean():.6g}")  # in float32 a limit may lie beyond it
     try:
         with unwrapped_ctrl_c():
-            asking = load(given | {name: Asking(name, grey) for name, grey in greys.items()})
+            bsdf = load(given | {name: asking(name, grey) for name, grey in greys.items()})
             wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
-            BSDFProbe(asking).values(wi, wi)
+            BSDFProbe(bsdf).values(wi, wi)
     except (RuntimeError, TypeError):
         return {}
     greys = {name: grey for name, grey in greys.items() if name in asked and grey > 0}
