@@ -1,4 +1,4 @@
-"""Gradients of a rendered picture, against finite differences."""
+"""Derivatives of weights, values and pictures, against finite differences."""
 
 import drjit as dr
 import mitsuba as mi
