@@ -24,7 +24,6 @@ class Row:
     bsdf: dict
     reference: Callable
     """f cosθ_o for arrays ``wi`` and ``wo``, from the independent float64 reference."""
-    reciprocal: bool = True
     sharp: bool = False
     """Narrower than the usual resolution of a chi² test."""
     transmits: bool = False
@@ -63,10 +62,11 @@ EXTREME = [row for file in _files for row in getattr(file, "EXTREME", [])]
 SMOOTH = {name: bsdf for file in _files for name, bsdf in file.SMOOTH.items()}
 
 
-def mostly_slow(names):
-    """The names or rows as parameters of a test that takes its time: but for the first of each plugin they are slow."""
+def mostly_slow(names, plugins=None):
+    """The names or rows as parameters of a test that takes its time: but for the first of each plugin, or of some, they
+    are slow."""
     names = list(names)
-    first = first_of_each(names).values()
+    first = [name for plugin, name in first_of_each(names).items() if plugin in (plugins or FIRST_ROWS)]
     return [pytest.param(name, id=str(name), marks=[] if name in first else pytest.mark.slow) for name in names]
 
 

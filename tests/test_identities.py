@@ -57,11 +57,6 @@ def test_roughdiffuse(fast, model):
         assert_same(roughdiffuse, {"type": "orennayar", "model": model, "sigma": (alpha or 0.2) / sqrt(2)})
 
 
-def test_roughdiffuse_of_a_mitsuba_06_scene():
-    xml = '<bsdf type="roughdiffuse" version="0.6.0"><boolean name="useFastApprox" value="true"/></bsdf>'
-    assert "use_fast_approx = True" in str(mi.load_string(xml))
-
-
 def test_full_orennayar_is_black_where_its_formula_is_negative():
     bsdf = mi.load_dict({"type": "orennayar", "model": "full", "sigma": 1.5, "reflectance": 0.2})
     wi, wo = hemisphere(20_000, 1), hemisphere(20_000, 2)

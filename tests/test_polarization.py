@@ -255,16 +255,6 @@ def test_the_colour_of_gold_is_that_of_unpolarized_variants(words):
     np.testing.assert_allclose(*reversed(values), rtol=5e-6, atol=1e-6 * np.median(values[0]))
 
 
-@pytest.mark.usefixtures("polarized")
-@pytest.mark.parametrize("words", [*WORDS, WORDS[0] | WORDS[3]], ids=" ".join)
-def test_light_is_traced_by_the_matrix_of_the_exchanged_directions(words):
-    bsdf = {"type": "walter", "eta": 1.5, "k": 2.0, "alpha": 0.5} | words
-    wi, wo = directions(2000)
-    found, expected = matrices(bsdf, wi, wo, MODES[1]), matrices(bsdf, wo, wi)
-    expected *= (wo[:, 2] / wi[:, 2])[:, None, None, None]
-    assert in_parts_of_the_intensity(found, expected).max() < 1e-4
-
-
 # --- Frames -----------------------------------------------------------------------------------------------------------
 
 METAL = {"type": "microfacet", "distribution": "ggx", "eta": 1.5, "k": 2.0}
@@ -282,17 +272,17 @@ def test_rotation_turns_facets_and_not_the_frames_of_light(mode):
 
 
 @pytest.mark.usefixtures("polarized")
-def test_light_goes_the_other_way_in_light_tracing():
+@pytest.mark.parametrize("words", [{}, {"diffuse_reflectance": 0.2}, *WORDS, WORDS[0] | WORDS[3]], ids=" ".join)
+def test_light_goes_the_other_way_in_light_tracing(words):
     """There f of exchanged directions is wanted: from wi to wo, also of what is not reciprocal."""
     wi, wo = directions(2000)
-    for given in ({}, {"multiscatter": "turquin"}, {"diffuse_reflectance": 0.2}):
-        bsdf = METAL | {"alpha_u": 0.2, "alpha_v": 0.5} | given
-        found = matrices(bsdf, wi, wo, MODES[1]) / wo[:, 2, None, None, None]
-        expected = matrices(bsdf, wo, wi) / wi[:, 2, None, None, None]
-        assert in_parts_of_the_intensity(found, expected).max() < 1e-5
-        if "multiscatter" not in given:
-            back = matrices(bsdf, wi, wo).swapaxes(-1, -2) * SWAP * SWAP[:, None] / wo[:, 2, None, None, None]
-            assert in_parts_of_the_intensity(found, back).max() < 1e-4
+    bsdf = METAL | {"alpha_u": 0.2, "alpha_v": 0.5} | words
+    found = matrices(bsdf, wi, wo, MODES[1]) / wo[:, 2, None, None, None]
+    expected = matrices(bsdf, wo, wi) / wi[:, 2, None, None, None]
+    assert in_parts_of_the_intensity(found, expected).max() < 1e-5
+    if words.get("multiscatter") != "turquin":
+        back = matrices(bsdf, wi, wo).swapaxes(-1, -2) * SWAP * SWAP[:, None] / wo[:, 2, None, None, None]
+        assert in_parts_of_the_intensity(found, back).max() < 1e-4
 
 
 @pytest.mark.usefixtures("polarized")

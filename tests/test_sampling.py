@@ -1,13 +1,12 @@
 """Samplers: the density is what pdf says, and the weight is eval/pdf."""
 
 import functools
-import itertools
 
 import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import REPRESENTATIVES, ROWS, mostly_slow
-from support import call, chi_square, context, direction, hemisphere
+from support import chi_square, context, direction, hemisphere
 
 from mi_brdfs.lobes import MicrofacetLobe
 from mi_brdfs.microfacet.distributions import GGX, Beckmann
@@ -23,12 +22,11 @@ ANGLES = [(0, 0), (80, 0), (60, 127)]
 
 
 def contexts(bsdf):
-    """The whole BSDF at all angles, and each of its components alone at two of them: what a component lacks shows in
+    """The whole BSDF at all angles, and each of its components alone at one of them: what a component lacks shows in
     the mixture, too."""
-    for angles in ANGLES:
-        yield angles, context()
+    yield from ((angles, context()) for angles in ANGLES)
     if bsdf.component_count() > 1:
-        yield from itertools.product(ANGLES[1:], map(context, range(bsdf.component_count())))
+        yield from ((ANGLES[-1], context(k)) for k in range(bsdf.component_count()))
 
 
 @functools.cache
@@ -40,52 +38,31 @@ def chi2_count():
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("row", mostly_slow(ROWS))
 def test_chi2(row):
-    """The stock test, with cells that a lobe does not outrun. Without samples it would pass, hence the last line."""
+    """The stock test, with cells that a lobe does not outrun. It would pass without samples, and with a density that is
+    a percent too large: so this integrates to the share of samples that count, good to 1e-3."""
     bsdf = mi.load_dict(row.bsdf)
     for angles, ctx in contexts(bsdf):
         resolution = {"res": 140, "ires": 32} if row.sharp else {"res": 101}
         test = chi_square(bsdf, ctx, direction(*angles), seed=ANGLES.index(angles), **resolution)
         accepted = test.run(test_count=chi2_count(), quiet=True)
         assert accepted, f"component {ctx.component} at {angles}: {test.messages}"
-        assert test.histogram_sum[0] > 0.2
+        drawn = test.histogram_sum[0]
+        assert drawn > 0.2
+        assert test.pdf_sum[0] == pytest.approx(drawn, abs=2e-3)
+
+
+RICHEST = {row.bsdf["type"]: row for row in REPRESENTATIVES}
+"""Of each model the row with the most parameters."""
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("row", REPRESENTATIVES, ids=str)
 def test_passes_the_checker(row):
-    """Of the public checker, what needs no statistics. One angle of incidence does: it looks at directions all over,
-    too."""
-    report = check(row.bsdf, angles=(60,), only=EXACT)
+    """Of the public checker, what needs no statistics, and of a model's other choices what depends on them alone. One
+    angle of incidence does: it looks at directions all over, too."""
+    report = check(row.bsdf, angles=(60,), only=EXACT if row in RICHEST.values() else ("reciprocity", "flags"))
     assert report.passed, report
-
-
-@functools.cache
-def mirror_grid(angles, radial, azimuthal, power=3):
-    """Directions on a polar grid around the mirror direction of the one at ``angles``, denser towards it, and their
-    solid angles."""
-    s, phi = np.meshgrid((np.arange(radial) + 0.5) / radial, (np.arange(azimuthal) + 0.5) / azimuthal * 2 * np.pi)
-    theta = np.pi * s**power
-    solid_angle = np.sin(theta) * power * np.pi * s ** (power - 1) / radial * 2 * np.pi / azimuthal
-    axis = direction(*angles) * [-1, -1, 1]
-    side = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.5 else [0, 1, 0])
-    side /= np.linalg.norm(side)
-    up = np.cross(axis, side)
-    directions = [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
-    wo = sum(d[..., None] * base for d, base in zip(directions, (side, up, axis), strict=True))
-    return wo.reshape(-1, 3).astype(np.float32), solid_angle.ravel()
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("row", mostly_slow(ROWS))
-def test_density_integrates_to_one_at_most(row):
-    """By the midpoint rule, good to 1e-3 on this grid. A lobe behind the surface may begin with a jump, so that grid
-    gets a border in the horizon."""
-    bsdf, grid = mi.load_dict(row.bsdf), (1600, 600)
-    for angles, ctx in contexts(bsdf):
-        wo, solid_angle = mirror_grid((0, 0), *grid, power=1) if row.transmits else mirror_grid(angles, *grid)
-        pdf = call(bsdf.pdf, ctx, direction(*angles), wo)[0]
-        assert 0.2 < (pdf[:, 0] * solid_angle).sum() < 1 + 1e-3
 
 
 @pytest.mark.usefixtures("llvm_rgb")

@@ -138,44 +138,6 @@ def test_values_and_samples(variant):
     check_each(check_values_and_samples, {row.name: row for row in rows} if in_plain_python() else RICHEST)
 
 
-def tiles(integrator):
-    """A square of each model beside the other, under a sky of radiance one."""
-    T, n = mi.ScalarTransform4f, len(NAMES)
-    scene = {
-        "type": "scene",
-        "integrator": integrator,
-        "sensor": {
-            "type": "perspective",  # Mitsuba cannot freeze its orthographic one
-            "fov": np.degrees(2 * np.arctan(0.25)),
-            "to_world": T().look_at([n, 0, 4 * n], [n, 0, 0], [0, 1, 0]),
-            "film": {
-                "type": "hdrfilm",
-                "width": 8 * n,
-                "height": 8,
-                "rfilter": {"type": "box"},
-                "pixel_format": "rgb" if mi.is_rgb else "luminance",  # colours outside of RGB's gamut are negative
-            },
-        },
-        "sky": {"type": "constant"},
-    }
-    for k, name in enumerate(NAMES):
-        to_world = T().translate([2 * k + 1, 0, 0]).rotate([1, 1, 0], 30)
-        scene[name] = {"type": "rectangle", "to_world": to_world, "bsdf": {"type": name}}
-    return mi.load_dict(scene)
-
-
-def test_picture(variant):
-    """No model is black, and none of its pixels bad. Light sources alone are sampled here, as that compiles in no time:
-    test_matrix has longer paths."""
-    image = np.array(mi.render(tiles({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}), spp=4))
-    check_each(check_tile, dict(zip(NAMES, np.split(image, len(NAMES), axis=1), strict=True)))
-
-
-def check_tile(tile):
-    assert np.isfinite(tile).all() and tile.min() >= 0
-    assert tile[2:-2, 2:-2].any()
-
-
 @functools.cache
 def keys_in(variant):
     """The keys of all parameters, by plugin name and for some of the rows."""
@@ -314,6 +276,26 @@ def test_frozen_values(variant):
     check_each(check_frozen_values, {"roughconductor": CONTROL} | {name: row.bsdf for name, row in RICHEST.items()})
 
 
+def tiles():
+    """A square of each model beside the other, under a sky of radiance one."""
+    T, n = mi.ScalarTransform4f, len(NAMES)
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 2},
+        "sensor": {
+            "type": "perspective",  # Mitsuba cannot freeze its orthographic one
+            "fov": np.degrees(2 * np.arctan(0.25)),
+            "to_world": T().look_at([n, 0, 4 * n], [n, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": 8 * n, "height": 8, "rfilter": {"type": "box"}},
+        },
+        "sky": {"type": "constant"},
+    }
+    for k, name in enumerate(NAMES):
+        to_world = T().translate([2 * k + 1, 0, 0]).rotate([1, 1, 0], 30)
+        scene[name] = {"type": "rectangle", "to_world": to_world, "bsdf": {"type": name}}
+    return mi.load_dict(scene)
+
+
 @pytest.mark.parametrize("variant", COMPILED_RGB, indirect=True)
 def test_frozen_pictures(variant):
     """In a process of its own: Dr.Jit records no picture while a BSDF that its scene does not hold is alive."""
@@ -323,7 +305,7 @@ def test_frozen_pictures(variant):
 
 def check_frozen_pictures(variant):
     mi.set_variant(variant)
-    scene = tiles({"type": "path", "max_depth": 2})
+    scene = tiles()
     params = mi.traverse(scene)
     keys = [key for key in params.keys() if "bsdf" in key and key.endswith(".value")]
 

@@ -43,10 +43,8 @@ class PixelCentreIntegrator:
     def render(
         self, scene: mi.Scene, sensor: Any = 0, seed: int = 0, spp: int = 0, develop: bool = True, evaluate: bool = True
     ) -> mi.TensorXf:
-        if isinstance(sensor, int):
-            sensor = scene.sensors()[sensor]
-        film, count = sensor.film(), self._sampler(sensor, spp).sample_count()
-        self.put(film, self.sums(scene, sensor, seed, spp), count)
+        sensor, film, sampler = self._opened(scene, sensor, spp)
+        self.put(film, self.sums(scene, sensor, seed, spp), sampler.sample_count())
         if not develop:
             film.schedule_storage()
             return mi.TensorXf()
@@ -62,7 +60,7 @@ class PixelCentreIntegrator:
         The sums of different seeds may be added. The memory needed does not depend on ``spp``, unless derivatives are
         recorded; ``mi.render`` does not record them over several passes.
         """
-        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        sensor, film, sampler = self._opened(scene, sensor, spp)
         if mi.has_flag(film.flags(), mi.FilmFlags.Special):
             raise ValueError(
                 f"{self.physics.plugins[0]}: {film.class_name()} has no colours to finish; use an hdrfilm."
@@ -110,9 +108,7 @@ class PixelCentreIntegrator:
         self, scene: mi.Scene, params: Any, grad_in: Any, sensor: Any = 0, seed: int = 0, spp: int = 0
     ) -> None:
         """Do as Mitsuba's own, but pass by pass, by the derivative of the finish at the mean of all."""
-        if isinstance(sensor, int):
-            sensor = scene.sensors()[sensor]
-        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        sensor, film, sampler = self._opened(scene, sensor, spp)
         if samples_at_once(film, sampler) == sampler.sample_count():
             return mi.SamplingIntegrator.render_backward(self, scene, params, grad_in, sensor, seed, spp)
         with dr.suspend_grad():
@@ -128,9 +124,7 @@ class PixelCentreIntegrator:
 
     def render_forward(self, scene: mi.Scene, params: Any, sensor: Any = 0, seed: int = 0, spp: int = 0) -> Any:
         """Do as Mitsuba's own, but pass by pass."""
-        if isinstance(sensor, int):
-            sensor = scene.sensors()[sensor]
-        film, sampler = sensor.film(), self._sampler(sensor, spp)
+        sensor, film, sampler = self._opened(scene, sensor, spp)
         sums, tangent = mi.Vector4f(0), mi.Vector4f(0)
         # Recorded calls whose results come to nothing, as beside masks, cannot be differentiated in this direction.
         recorded = dr.JitFlag.SymbolicLoops, dr.JitFlag.SymbolicCalls
@@ -159,12 +153,15 @@ class PixelCentreIntegrator:
         film.put_block(block)
 
     @staticmethod
-    def _sampler(sensor: Any, spp: int) -> mi.Sampler:
-        """Return a clone of the sensor's sampler, for ``spp`` samples per pixel or the scene's number."""
+    def _opened(scene: mi.Scene, sensor: Any, spp: int) -> tuple[Any, mi.Film, mi.Sampler]:
+        """Return a sensor, which may be given by its index, its film, and a clone of its sampler, for ``spp`` samples
+        per pixel or the scene's number."""
+        if isinstance(sensor, int):
+            sensor = scene.sensors()[sensor]
         sampler = sensor.sampler().clone()
         if spp:
             sampler.set_sample_count(spp)
-        return sampler
+        return sensor, sensor.film(), sampler
 
     def _look(self, scene: mi.Scene, sensor: Any, sampler: mi.Sampler, corner: Any) -> list[mi.Float]:
         """Return the red, green and blue of a sample through the centre of a pixel, and its opacity."""

@@ -4,7 +4,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import LambertLobe, Lobe, MicrofacetLobe, WeightedLobe
-from ..math import EPSILON, TINY, Spectrum, clamp, expm1_ratio, log1p_ratio, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, Spectrum, clamp, expm1_ratio, log1p_ratio, safe_sqrt
 from ..microfacet.distributions import GGX, Distribution
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.fresnel import Fresnel, Schlick
@@ -131,7 +131,7 @@ class SchlickNormals(Distribution):
         return self.r / dr.square(facet.sin2_h + self.r * dr.square(facet.cos_h))
 
     def eval(self, facet: Facet) -> mi.Float:
-        w, _ = normalize_or(facet.h.x, facet.h.y, (1, 0))
+        w, _ = facet.azimuth
         p2 = dr.square(self.isotropy)
         return dr.inv_pi * self._zenith(facet) * dr.sqrt(self.isotropy / (p2 + (1 - p2) * w * w))
 

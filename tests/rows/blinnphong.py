@@ -13,7 +13,6 @@ def row(name, ρd, ρs, n, normalization="energy", sharp=False, **given):
         partial(
             ref.blinnphong, diffuse_reflectance=ρd, specular_reflectance=ρs, exponent=n, normalization=normalization
         ),
-        reciprocal=normalization != "original",
         sharp=sharp,
     )
 

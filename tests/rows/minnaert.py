@@ -9,7 +9,6 @@ def row(name, ρ, k, normalization="energy", **given):
         f"minnaert {name}",
         {"type": "minnaert", "normalization": normalization, **given},
         partial(ref.minnaert, reflectance=ρ, exponent=k, normalization=normalization),
-        reciprocal=normalization != "none",
     )
 
 

@@ -9,7 +9,6 @@ def row(name, ρd, ρs, n, normalization="energy", sharp=False, **given):
         f"phong {name}",
         {"type": "phong", "normalization": normalization, **given},
         partial(ref.phong, diffuse_reflectance=ρd, specular_reflectance=ρs, exponent=n, normalization=normalization),
-        reciprocal=normalization != "original",
         sharp=sharp,
     )
 

@@ -19,7 +19,7 @@ DEFAULTS = {
 def row(name, sharp=False, **given):
     # At an edge the reference must know the threshold as the plugin does, in float32.
     exact = {k: v if isinstance(v, str) else float(np.float32(v)) for k, v in {**DEFAULTS, **given}.items()}
-    return Row(f"toon {name}", {"type": "toon", **given}, partial(ref.toon, **exact), reciprocal=False, sharp=sharp)
+    return Row(f"toon {name}", {"type": "toon", **given}, partial(ref.toon, **exact), sharp=sharp)
 
 
 def lit(threshold, smooth, shadow=0.0):

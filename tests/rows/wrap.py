@@ -9,7 +9,6 @@ def row(name, ρ, w, n, domain="hemisphere", normalization="energy", **given):
         f"wrap {name}",
         {"type": "wrap", "domain": domain, "normalization": normalization, **given},
         partial(ref.wrap, reflectance=ρ, wrap=w, exponent=n, domain=domain, normalization=normalization),
-        reciprocal=False,
         transmits=domain == "sphere",
     )
 
