@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -39,10 +39,16 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
 
 
 def load(
-    path: Path, parameters: Mapping[str, str], lenient: bool = False, merge: bool = False, only: str | None = None
+    path: Path,
+    parameters: Mapping[str, str],
+    lenient: bool = False,
+    merge: bool = False,
+    only: str | None = None,
+    change: Callable[[Any], None] = lambda state: None,
 ) -> Any:
-    """Load a scene file, old or new, or ``only`` the BSDF in it with an id. With ``merge``, as Mitsuba does it, BSDFs
-    that are alike become one, and meshes with the same BSDF: it is faster, and ids are lost."""
+    """Load a scene file, old or new, or ``only`` the BSDF in it with an id, and ``change`` it once it is parsed. With
+    ``merge``, as Mitsuba does it, BSDFs that are alike become one, and meshes with the same BSDF: it is faster, and ids
+    are lost."""
     with looking_in(path.parent):
         config = mi.parser.ParserConfig(mi.variant())
         state, upgraded = parsed(config, path, lenient, parameters)
@@ -51,6 +57,7 @@ def load(
         config.merge_meshes = merge and "flip_normals" not in (upgraded or "")
         with naming(path, upgraded):
             mi.parser.transform_all(config, state)
+            change(state)
             if only is not None:
                 state.nodes[0] = state.nodes[_bsdfs(state)[only]]
             return instantiated(config, state)
