@@ -62,8 +62,7 @@ class SceneFile:
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
         with looking_in(Path(self.path).parent):
-            config = mi.parser.ParserConfig(mi.variant())
-            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
+            state, text = parsed(Path(self.path), self.lenient, self.parameters)
             found = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in file_names(state)}
         named = {name: path for name, path in found.items() if os.path.isfile(path)}
         names = {name: _rootless(path) for name, path in named.items()}
