@@ -211,6 +211,7 @@ def shape(inner):
 def upgraded(folder):
     """Upgrade a scene from the text in it, and return it with XML on one line."""
     (folder / "rising.spd").write_text("# nm value\n400 0.1\n700 0.9\n")
+    (folder / "two.obj").write_text("# two\nmtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
     (folder / "lamp.xml").write_text('<scene version="0.6.0"><emitter type="point"/></scene>')
 
     def upgraded(text, **options):
@@ -426,17 +427,6 @@ def test_missing_files(upgraded, old, stand_in):
     assert re.search(r"(replaced|dropped): .*a\.\w+", new.report())
     if "cube" in stand_in:
         assert '<scale value="2"/></transform><bsdf type="conductor">' in new.xml
-
-
-@pytest.mark.parametrize(
-    "bsdfs, said",
-    [("", "dropped: the materials of two.obj"), ("red green", "approximated: the obj has the first of its 2 BSDFs")],
-)
-def test_materials_of_an_obj_are_named(folder, upgraded, bsdfs, said):
-    (folder / "two.obj").write_text("# two\nmtllib two.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
-    inner = "".join(f'<bsdf name="{name}" type="diffuse"/>' for name in bsdfs.split())
-    new = upgraded(f'<shape type="obj"><string name="filename" value="two.obj"/>{inner}</shape>')
-    assert said in new.report() and new.xml.count('type="diffuse"') == min(len(bsdfs), 1)
 
 
 TRIANGLE = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]

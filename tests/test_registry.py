@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mitsuba as mi
 import pytest
+from rich.cells import cell_len
 
 import mi_brdfs
 from mi_brdfs.mitsuba import llvm
@@ -80,6 +81,7 @@ def test_no_builtin_is_shadowed():
 
 def test_list_and_info():
     assert {"lambert", "phong", "ward", "walter"} <= set(mi_brdfs.list_models())
+    assert "shading" not in mi_brdfs.list_models()
     page = mi_brdfs.info("ward")
     assert not any("``" in mi_brdfs.info(name) or ":func:" in mi_brdfs.info(name) for name in mi_brdfs.list_models())
     for part in ("doi:10.1145/133994.134078", "alpha_u, alpha_v", "balanced | ward | ward-duer", "Reciprocal"):
@@ -89,12 +91,12 @@ def test_list_and_info():
         mi_brdfs.info("phnog")
 
 
-@pytest.mark.parametrize("name", [name for model in own_models() for name in model.plugins])
+@pytest.mark.parametrize("name", [*(name for model in own_models() for name in model.plugins), "shading"])
 def test_examples_on_the_manual_pages_load(name):
     page = mi_brdfs.info(name)
-    xml = re.search(r"<bsdf .*?</bsdf>", page, re.S).group().replace("<bsdf", '<bsdf version="3.0.0"', 1)
+    xml = re.search(r"<(bsdf|integrator) .*?</\1>", page, re.S).group().replace(">", ' version="3.0.0">', 1)
     given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
-    assert all(len(line) <= 100 for line in page.splitlines())
+    assert all(cell_len(line) <= 100 for line in page.splitlines())
     with mi.variant_context("scalar_rgb"):
         assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
 

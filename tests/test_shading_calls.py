@@ -1,8 +1,7 @@
 """What ``shading`` can be part of: derivatives, frozen functions, threads and other integrators; what it says of bad
-input, and its manual page."""
+input."""
 
 import gc
-import re
 from concurrent.futures import ThreadPoolExecutor
 
 import drjit as dr
@@ -12,7 +11,6 @@ import pytest
 from plates import SKY, SUN, WHITE, film, from_above, lamp, noisy, plate, refused, shaded
 from support import fresh_process
 
-import mi_brdfs
 from mi_brdfs.mitsuba import integrator as adapter
 from mi_brdfs.mitsuba.integrator import LANES
 
@@ -155,7 +153,7 @@ def test_within_aov():
     np.testing.assert_allclose(image[..., 4:], 0.8, rtol=1e-4)
 
 
-# --- Bad input, and the manual page ----------------------------------------------------------------------------------
+# --- Bad input -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.usefixtures("llvm_rgb")
@@ -188,14 +186,3 @@ def test_films_without_colours_are_refused():
         sensor = mi.load_dict({"type": "orthographic", "film": film})
         with pytest.raises(ValueError, match="shading: SpecFilm has no colours to finish; use an hdrfilm"):
             mi.load_dict({"type": "shading"}).render(plate(WHITE, SUN), sensor)
-
-
-def test_manual_page():
-    page = mi_brdfs.info("shading")
-    assert "pi_folded" in page
-    xml = re.search(r"<integrator .*?</integrator>", page, re.S).group().replace(">", ' version="3.0.0">', 1)
-    given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
-    for variant in ("scalar_rgb", "scalar_spectral"):
-        with mi.variant_context(variant):
-            assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
-    assert "shading" not in mi_brdfs.list_models()
