@@ -79,18 +79,14 @@ def peak(work, *given):
     return result, dr.detail.malloc_watermark(dr.JitBackend.LLVM)
 
 
-def check_memory(monkeypatch):
-    """16 times as many samples take no more memory."""
+@pytest.mark.usefixtures("llvm_rgb")
+def test_memory_does_not_grow_with_samples(monkeypatch):
+    """16 times as many take no more."""
     monkeypatch.setattr(adapter, "LANES", 8 * 64 * 64)
     scene = noisy(64)
     # What is in use while the first compiles its kernels does not count.
     _, (_, few), (_, many) = (peak(lambda spp: dr.eval(mi.render(scene, spp=spp)), spp) for spp in (32, 32, 512))
     assert many < 1.05 * few
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_memory_does_not_grow_with_samples(monkeypatch):
-    check_memory(monkeypatch)
 
 
 @pytest.mark.slow
