@@ -98,7 +98,10 @@ def test_no_command_is_left_out():
 def test_python(tmp_path):
     """All blocks in one process, in order; the picture, of an eighth of the samples, is neither dark nor clipped.
     Fits are of small pictures, and short."""
-    small = "import mi_brdfs.fit.appearance as it; it.SIZE, it.SAMPLES = 48, 4"
+    small = (
+        "import mi_brdfs.fit.appearance as it; it.SIZE, it.SAMPLES = 48, 4\n"
+        "import mi_brdfs.fit.pictures as it; it.SAMPLES = 1 << 12"
+    )
     show = "print(copper['diffuse_reflectance'] + max(copper['specular_reflectance']['value']))"
     code = "\n".join([small, *blocks("python"), show])
     render = "mi.render(mi.load_dict(scene), spp=32)"
