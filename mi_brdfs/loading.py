@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -39,38 +39,38 @@ def load_legacy(path: str | os.PathLike, *, lenient: bool = False, **parameters:
 
 
 def load(
-    path: Path, parameters: Mapping[str, str], lenient: bool = False, merge: bool = False, only: str | None = None
+    path: Path,
+    parameters: Mapping[str, str],
+    lenient: bool = False,
+    merge: bool = False,
+    only: str | None = None,
+    change: Callable[[Any], None] = lambda state: None,
 ) -> Any:
-    """Load a scene file, old or new, or ``only`` the BSDF in it with an id. With ``merge``, as Mitsuba does it, BSDFs
-    that are alike become one, and meshes with the same BSDF: it is faster, and ids are lost."""
+    """Load a scene file, old or new, or ``only`` the BSDF in it with an id, and ``change`` it once it is parsed. With
+    ``merge``, as Mitsuba does it, BSDFs that are alike become one, and meshes with the same BSDF: it is faster, and ids
+    are lost."""
     with looking_in(path.parent):
+        state, upgraded = parsed(path, lenient, parameters)
         config = mi.parser.ParserConfig(mi.variant())
-        state, upgraded = parsed(config, path, lenient, parameters)
         config.merge_equivalent = merge
         # Mitsuba merges what is turned inside out with what is not, and fails.
         config.merge_meshes = merge and "flip_normals" not in (upgraded or "")
-        with naming(path, upgraded):
+        try:
             mi.parser.transform_all(config, state)
+            change(state)
             if only is not None:
                 state.nodes[0] = state.nodes[_bsdfs(state)[only]]
-            return instantiated(config, state)
-
-
-@contextmanager
-def naming(path: Path, upgraded: str | None) -> Iterator[None]:
-    """Name a file in what Mitsuba says, which has its text as a string if it was upgraded or given a version."""
-    try:
-        yield
-    except RuntimeError as error:
-        place = f"{path}, upgraded" if upgraded else str(path)
-        text = re.sub(r"\b(At|loading) string \(line", lambda found: f"{found[1]} {place} (line", str(error))
-        raise RuntimeError(text) from error.__cause__
+            return _instantiated(config, state)
+        except RuntimeError as error:  # which calls a file that was upgraded, or given a version, a string
+            place = f"{path}, upgraded" if upgraded else str(path)
+            text = re.sub(r"\b(At|loading) string \(line", lambda found: f"{found[1]} {place} (line", str(error))
+            raise RuntimeError(text) from error.__cause__
 
 
 def ids_of_bsdfs(path: Path, parameters: Mapping[str, str]) -> list[str]:
     """Return the ids of all BSDFs of a scene file, whether or not a shape has them."""
     with looking_in(path.parent):
-        return list(_bsdfs(parsed(mi.parser.ParserConfig(mi.variant()), path, False, parameters)[0]))
+        return list(_bsdfs(parsed(path, False, parameters)[0]))
 
 
 def _bsdfs(state: Any) -> dict[str, int]:
@@ -84,11 +84,12 @@ def load_text(text: str, parameters: Mapping[str, str]) -> Any:
     state = mi.parser.parse_string(config, versioned(text), **parameters)
     config.merge_equivalent = False
     mi.parser.transform_all(config, state)
-    return instantiated(config, state)
+    return _instantiated(config, state)
 
 
-def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
+def parsed(path: Path, lenient: bool, parameters: Mapping[str, str]) -> tuple[Any, str | None]:
     """Return a scene file as Mitsuba's parser has it, and the text of an upgraded one."""
+    config = mi.parser.ParserConfig(mi.variant())
     check_name(str(path))
     for it in mentioned([str(path)], values=parameters).values():
         if not os.path.isfile(it):  # Mitsuba would wait for it
@@ -107,7 +108,7 @@ def parsed(config: Any, path: Path, lenient: bool, parameters: Mapping[str, str]
     return mi.parser.parse_string(config, new.xml), new.xml
 
 
-def instantiated(config: Any, state: Any) -> Any:
+def _instantiated(config: Any, state: Any) -> Any:
     """Return what a parsed scene describes. Raise a ValueError where that would end the process or never end: as
     :func:`check_plugin` and :func:`checked_mesh` do, and for BSDFs that are nested too deeply."""
     bsdfs = dict[int, list[int]]()

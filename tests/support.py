@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import multiprocessing
 import os
+import subprocess
+import sys
 import tracemalloc
 from concurrent.futures import ProcessPoolExecutor
 from html.parser import HTMLParser
@@ -64,6 +66,11 @@ def turned(w: np.ndarray, phi: float) -> np.ndarray:
     """Directions turned about the normal by an angle in radians."""
     x, y, z = w.T
     return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
+
+
+def python(code: str, **options) -> subprocess.CompletedProcess:
+    """What became of some code in a fresh Python."""
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, **options)
 
 
 def fresh_process():

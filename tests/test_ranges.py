@@ -142,20 +142,3 @@ def test_project_keeps_an_optimizer_going():
         assert 1e-4 <= optimizer["alpha.value"][0] <= 2 and dr.all(optimizer["alpha.value"] == params["alpha.value"])
     assert optimizer["alpha.value"][0] == pytest.approx(0.7, abs=0.01)
     assert params["diffuse_reflectance.value"] == 5
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_project_keeps_an_optimizer_of_a_scene_going():
-    """The gradients of pictures are those of its variables, too."""
-    scene = mi.load_dict(mi_brdfs.preview_scene({"type": "ward", "alpha": 0.9}))
-    params = mi.traverse(scene)
-    key = next(key for key in params.keys() if key.endswith("alpha.value"))
-    optimizer = mi.ad.Adam(lr=0.5)
-    optimizer[key] = params[key]
-    params.update(optimizer)
-    for _ in range(3):
-        dr.backward(-dr.mean(mi.render(scene, params, spp=1)))
-        assert dr.grad(optimizer[key])[0] != 0
-        optimizer.step()
-        params.update(optimizer)
-        mi_brdfs.project(params, optimizer)

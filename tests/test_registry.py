@@ -2,24 +2,16 @@
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import mitsuba as mi
 import pytest
+from rich.cells import cell_len
+from support import python
 
 import mi_brdfs
 from mi_brdfs.mitsuba import llvm
 from mi_brdfs.mitsuba.registry import own_models
-
-
-def run(code: str) -> str:
-    """What a fresh Python prints."""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
 
 AFTER = "import mitsuba as mi; mi.set_variant('{0}'); import mi_brdfs"
 CHECK = "; print(type(mi.load_dict({'type': 'ward'})).__name__, mi.variant())"
@@ -30,8 +22,8 @@ def test_any_order_of_import_and_variant(before):
     """Also an import once more, and variants back and forth."""
     first = "import mi_brdfs, mitsuba as mi; assert mi.variant() is None; mi.set_variant('{0}')" if before else AFTER
     again = "; import mi_brdfs; [mi.set_variant(v) for v in ('scalar_spectral_polarized', 'scalar_spectral') * 2]"
-    told = run(first.format("scalar_rgb") + CHECK + again + CHECK)
-    assert told == "Ward scalar_rgb\nWard scalar_spectral\n"
+    done = python(first.format("scalar_rgb") + CHECK + again + CHECK)
+    assert done.stdout == "Ward scalar_rgb\nWard scalar_spectral\n", done.stderr
 
 
 @pytest.mark.slow
@@ -39,7 +31,8 @@ def test_any_order_of_import_and_variant(before):
 def test_any_order_in_llvm(monkeypatch):
     """Where the LLVM is safe that Dr.Jit takes if it is imported first."""
     monkeypatch.setenv(llvm.VARIABLE, llvm.extra_library())
-    assert run(AFTER.format("llvm_ad_rgb") + CHECK) == "Ward llvm_ad_rgb\n"
+    done = python(AFTER.format("llvm_ad_rgb") + CHECK)
+    assert done.stdout == "Ward llvm_ad_rgb\n", done.stderr
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to leave a process one processor here")
@@ -48,7 +41,8 @@ def test_one_processor_reads_and_writes_bitmaps(tmp_path):
     alone = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))}); import mi_brdfs, mitsuba as mi"
     path = str(tmp_path / "grey.exr")
     there = f"; mi.set_variant('scalar_rgb'); mi.Bitmap(mi.TensorXf([0.5] * 72, (4, 6, 3))).write({path!r})"
-    assert run(f"{alone}{there}; print(mi.Bitmap({path!r}).size())") == "[6, 4]\n"
+    done = python(f"{alone}{there}; print(mi.Bitmap({path!r}).size())")
+    assert done.stdout == "[6, 4]\n", done.stderr
 
 
 def test_variant_context():
@@ -80,6 +74,7 @@ def test_no_builtin_is_shadowed():
 
 def test_list_and_info():
     assert {"lambert", "phong", "ward", "walter"} <= set(mi_brdfs.list_models())
+    assert "shading" not in mi_brdfs.list_models()
     page = mi_brdfs.info("ward")
     assert not any("``" in mi_brdfs.info(name) or ":func:" in mi_brdfs.info(name) for name in mi_brdfs.list_models())
     for part in ("doi:10.1145/133994.134078", "alpha_u, alpha_v", "balanced | ward | ward-duer", "Reciprocal"):
@@ -89,12 +84,12 @@ def test_list_and_info():
         mi_brdfs.info("phnog")
 
 
-@pytest.mark.parametrize("name", [name for model in own_models() for name in model.plugins])
+@pytest.mark.parametrize("name", [*(name for model in own_models() for name in model.plugins), "shading"])
 def test_examples_on_the_manual_pages_load(name):
     page = mi_brdfs.info(name)
-    xml = re.search(r"<bsdf .*?</bsdf>", page, re.S).group().replace("<bsdf", '<bsdf version="3.0.0"', 1)
+    xml = re.search(r"<(bsdf|integrator) .*?</\1>", page, re.S).group().replace(">", ' version="3.0.0">', 1)
     given = re.search(r'^\{"type".*?\}$', page, re.S | re.M).group()
-    assert all(len(line) <= 100 for line in page.splitlines())
+    assert all(cell_len(line) <= 100 for line in page.splitlines())
     with mi.variant_context("scalar_rgb"):
         assert str(mi.load_string(xml)) == str(mi.load_dict(eval(given)))
 

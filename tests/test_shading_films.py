@@ -63,16 +63,12 @@ def test_filters_act_on_finished_pixels(name, rfilter, border):
         check_pixels(rfilter, border)
 
 
-def check_alpha():
-    """Under an environment nothing is transparent, however many samples there are."""
+@pytest.mark.usefixtures("llvm_rgb")
+def test_nothing_is_transparent_under_an_environment():
+    """However many samples there are."""
     sensor = {"type": "orthographic", "to_world": from_above(), "film": film(pixel_format="rgba")}
     for spp in (1, 3):
         np.testing.assert_allclose(shaded(noisy(sensor=sensor), spp=spp)[..., 3], 1, atol=1e-6)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_alpha_under_an_environment():
-    check_alpha()
 
 
 SENSORS = {

@@ -36,11 +36,8 @@ def grazing(f0, degrees):
 )
 def test_environment_reflection(bsdf, reflectance):
     """What it adds to a surface whose diffuse lobes are black."""
-    dark = {key: 0.0 for key in ("diffuse_reflectance", "reflectance")}
-    inner = {key: it for key, it in bsdf.items() if isinstance(it, dict)} or {"": bsdf}
-    for it in inner.values():
-        name = "reflectance" if it["type"] in ("eon", "lambert") else "diffuse_reflectance"
-        it[name] = dark[name]
+    for it in [it for it in bsdf.values() if isinstance(it, dict)] or [bsdf]:
+        it["reflectance" if it["type"] in ("eon", "lambert") else "diffuse_reflectance"] = 0.0
     assert shade(bsdf, SKY, environment_reflection=True, tilt=60) == pytest.approx(0.5 * reflectance, abs=1e-5)
 
 

@@ -2,9 +2,9 @@
 
 import mitsuba as mi
 import pytest
-from test_shading_films import check_alpha, check_pixels
-from test_shading_passes import check_finish, check_memory
-from test_shading_through import check_layers, check_masks
+import test_shading_films as films
+import test_shading_passes as passes
+import test_shading_through as through
 
 from mi_brdfs.integrators import shading
 from mi_brdfs.mitsuba import integrator as adapter
@@ -75,18 +75,18 @@ def add_layers_in_full(null_transmission):
 
 INTEGRATOR = "the integrator's class"
 MUTANTS = [
-    (finish_each_pass, INTEGRATOR, "sums", check_finish),
-    (finish_each_sample, INTEGRATOR, "_look", check_finish),
-    (finish_nothing, shading.Shading, "finish", check_finish),
-    (weigh_the_last_pass_like_the_others, INTEGRATOR, "sums", check_finish),
-    (put_sums_as_means, INTEGRATOR, "put", check_finish),
-    (draw_all_at_once, INTEGRATOR, "sums", check_memory),
-    (look_through_corners, INTEGRATOR, "_look", check_pixels),
-    (forget_the_border, adapter, "pixels", lambda: check_pixels("gaussian", border=True)),
-    (count_what_all_lanes_share_once, adapter, "added", check_alpha),
-    (block_what_is_behind, shading, "may_pass", check_masks),
-    (shine_through_everything, shading, "straight_through", check_masks),
-    (add_layers_in_full, shading, "null_transmission", check_layers),
+    (finish_each_pass, INTEGRATOR, "sums", passes.check_finish),
+    (finish_each_sample, INTEGRATOR, "_look", passes.check_finish),
+    (finish_nothing, shading.Shading, "finish", passes.check_finish),
+    (weigh_the_last_pass_like_the_others, INTEGRATOR, "sums", passes.check_finish),
+    (put_sums_as_means, INTEGRATOR, "put", passes.check_finish),
+    (draw_all_at_once, INTEGRATOR, "sums", passes.test_memory_does_not_grow_with_samples),
+    (look_through_corners, INTEGRATOR, "_look", films.check_pixels),
+    (forget_the_border, adapter, "pixels", lambda: films.check_pixels("gaussian", border=True)),
+    (count_what_all_lanes_share_once, adapter, "added", films.test_nothing_is_transparent_under_an_environment),
+    (block_what_is_behind, shading, "may_pass", through.check_masks),
+    (shine_through_everything, shading, "straight_through", through.check_masks),
+    (add_layers_in_full, shading, "null_transmission", through.check_layers),
 ]
 """The change of a function, whose it is, its name, and the check that must notice. That the check passes without the
 change is a test of its own."""
@@ -99,4 +99,4 @@ def test_a_check_notices(mutant, owner, name, check, monkeypatch):
     owner = type(mi.load_dict({"type": "shading"})) if owner is INTEGRATOR else owner
     monkeypatch.setattr(owner, name, mutant(getattr(owner, name)))
     with pytest.raises(AssertionError):
-        check(*([monkeypatch] if check in (check_finish, check_memory) else []))
+        check(*([monkeypatch] if check.__module__ == passes.__name__ else []))

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from .document import Element, prop, written
-from .rules import rule
+from .tables import rule
 
 if TYPE_CHECKING:
     from .upgrade import Work

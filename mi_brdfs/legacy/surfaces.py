@@ -10,8 +10,7 @@ import numpy as np
 
 from ..parameters.fresnel import conductors, indices
 from .document import Element, plugin, prop, written
-from .rules import rule
-from .tables import PLUGINS
+from .tables import PLUGINS, rule
 
 if TYPE_CHECKING:
     from .upgrade import Work

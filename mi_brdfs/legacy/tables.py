@@ -1,10 +1,17 @@
-"""The plugins that are written, and what those of Mitsuba 0.2 to 0.6 and their properties are called now."""
+"""The plugins that are written, what those of Mitsuba 0.2 to 0.6 and their properties are called now, and the rules for
+those of 0.6 that take more than another name."""
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .document import Element
+    from .upgrade import Work
 
 
 class Entry:
@@ -42,3 +49,15 @@ def _read(lines: list[str]) -> None:
 
 
 _read((Path(__file__).parent / "plugins.txt").read_text(encoding="utf-8").splitlines())
+
+RULES: dict[tuple[str, str], Callable[[Work, Element], Element | None]] = {}
+"""The functions that change a plugin of a kind and a type, whose parts are those of Mitsuba 3, in place, or return what
+replaces it. Under "" and a kind is the one for all its other types."""
+
+
+def rule(kind: str, *types: str) -> Callable:
+    def declare(function: Any) -> Any:
+        RULES.update({(kind, type): function for type in types})
+        return function
+
+    return declare

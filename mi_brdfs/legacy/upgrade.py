@@ -17,9 +17,8 @@ import numpy as np
 from . import scenery  # noqa: F401, which fills RULES, as surfaces does
 from .document import Element, Reader, floats, plugin, prop, rgb_of, root_of, written
 from .older import modernize
-from .rules import RULES
 from .surfaces import colours
-from .tables import PLUGINS
+from .tables import PLUGINS, RULES
 
 PROPERTIES = ("float", "integer", "boolean", "string", "point", "vector", "transform")
 COUNTS: dict[str, tuple[int, ...]] = {"matrix": (16,), **dict.fromkeys(("origin", "target", "up"), (3,))}
@@ -186,7 +185,8 @@ class Work:
             scene.children.remove(sun)
 
     def _leave_out(self, parent: Element, children: list[Element], why: str) -> None:
-        parent.children = [it for it in parent.children if it not in children]
+        left_out = set(children)
+        parent.children = [it for it in parent.children if it not in left_out]
         for child in children:
             self.dropped(child, f"{child.name or child.type or child.tag} {why}")
 

@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError
 import mitsuba as mi
 
 from ..legacy import upgrade
-from ..loading import file_names, instantiated, load_text, looking_in, naming, parsed, referred
+from ..loading import file_names, load, load_text, looking_in, parsed, referred
 from ..probe.sources import BSDFSource
 
 RESERVED = ("config", "filename")
@@ -62,8 +62,7 @@ class SceneFile:
     def copied(self) -> SceneFile:
         """Return a copy with all files that the scene includes and names, for a machine that has none of them."""
         with looking_in(Path(self.path).parent):
-            config = mi.parser.ParserConfig(mi.variant())
-            state, text = parsed(config, Path(self.path), self.lenient, self.parameters)
+            state, text = parsed(Path(self.path), self.lenient, self.parameters)
             found = {props[key]: str(mi.file_resolver().resolve(props[key])) for props, key in file_names(state)}
         named = {name: path for name, path in found.items() if os.path.isfile(path)}
         names = {name: _rootless(path) for name, path in named.items()}
@@ -77,13 +76,9 @@ class SceneFile:
         )
 
     def _load(self, path: Path, names: dict[str, str], *folders: Path) -> Any:
-        config = mi.parser.ParserConfig(mi.variant())
-        with looking_in(path.parent, *folders):
-            state, upgraded = parsed(config, path, self.lenient, self.parameters)
+        def change(state: Any) -> None:
             for props, key in file_names(state):
                 props[key] = names.get(props[key], props[key])
-            config.merge_equivalent = config.merge_meshes = not (self.keeps_ids or self.replaced)
-            mi.parser.transform_all(config, state)
             _check_counts(state)
             shapes = {node.props.id() for node in state.nodes if node.type == mi.ObjectType.Shape}
             for id, source in sorted(self.replaced.items(), key=lambda it: it[0] in shapes):
@@ -91,8 +86,10 @@ class SceneFile:
                 _replace(state, id, mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf)
             if self.box_filter:
                 _set_box_filters(state)
-            with naming(path, upgraded):
-                return instantiated(config, state)
+
+        merge = not (self.keeps_ids or self.replaced)
+        with looking_in(*folders):
+            return load(path, self.parameters, self.lenient, merge, change=change)
 
 
 def _check_counts(state: Any) -> None:
