@@ -1,9 +1,9 @@
 """The package as installed: versions, import time, style."""
 
+import ast
 import graphlib
 import importlib
 import os
-import re
 import subprocess
 import sys
 import warnings
@@ -59,18 +59,48 @@ def test_style_and_types(tool):
     assert (Path(mi_brdfs.__file__).parent / "py.typed").exists()
 
 
+# fmt: off
+TRUNK = {
+    "math", "srgb", "observer", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba",
+    "ranges", "names", "variants", "legacy", "loading", "writing", "starting", "given", "preview", "probe", "rendering",
+    "__version__",
+    "info", "doctor",
+}
+# fmt: on
+MAY_IMPORT = {
+    "measured": set(),
+    "tabulated": {"measured"},
+    "plot": {"measured"},
+    "pages": {"plot"},
+    "validation": {"pages", "plot"},
+    "gallery": {"pages"},
+    "fit": {"measured", "pages", "plot"},
+    "cluster": set(),
+    "bench": set(),
+    "sweep": {"cluster", "fit", "gallery", "measured"},
+    "explorer": {"fit", "measured", "validation"},
+}
+"""The wings, each with those that it stands on besides the trunk."""
+
+
 def imports_out_of(room):
-    """Return the rooms of the package that a room imports, also inside functions."""
-    rooms = set()
+    """Yield what a room of the package imports of others, also inside functions: (file, import, rooms)."""
     for file in [room] if room.is_file() else room.rglob("*.py"):
-        dots = r"\." * (len(file.relative_to(room).parts) + 1)
-        line = rf"^ *from {dots}(\w*)[\w.]* import (\([^)]*\)|[^#\n]*)"
-        for module, names in re.findall(line, file.read_text(encoding="utf-8"), re.MULTILINE):
-            rooms |= {module} if module else {*re.findall(r"\w+", names)}
-    return rooms
+        inside = len(file.relative_to(room).parts)
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == inside + 1:
+                rooms = {node.module.split(".")[0]} if node.module else {name.name for name in node.names}
+                yield file, ast.unparse(node), rooms
+
+
+@pytest.mark.parametrize("wing", MAY_IMPORT)
+def test_wings_stand_on_what_they_may(wing):
+    for file, statement, rooms in imports_out_of(Path(mi_brdfs.__file__).parent / wing):
+        assert rooms <= TRUNK | MAY_IMPORT[wing], f"{file}: {statement}"
 
 
 def test_no_rooms_import_one_another():
     """Not even in a circle of several."""
     rooms = [it for it in Path(mi_brdfs.__file__).parent.iterdir() if it.is_dir() or it.suffix == ".py"]
-    graphlib.TopologicalSorter({it.stem: imports_out_of(it) for it in rooms}).prepare()
+    graph = {it.stem: set().union(*(found for *_, found in imports_out_of(it))) for it in rooms}
+    graphlib.TopologicalSorter(graph).prepare()
