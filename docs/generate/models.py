@@ -12,8 +12,7 @@ from PIL import Image
 
 from mi_brdfs import plot, preview
 from mi_brdfs.gallery import overview, sheet, shot, sweep_row
-from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import Sweep, listed, sweeps_of
+from mi_brdfs.gallery.contents import Sweep, by_family, listed, portrait, stage_of, sweeps_of, year
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
 from mi_brdfs.model import EXAMPLE, Model, Plugin
@@ -22,7 +21,7 @@ from mi_brdfs.preview import body, studio
 from mi_brdfs.probe.curves import in_plane_of_incidence
 from mi_brdfs.tabulated.tabulated import Tabulated
 
-from .made import ROOT, Page, Picture, code
+from .made import ROOT, Page, Picture, code, saved
 
 REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
 THUMBNAILS = ROOT / "docs" / "thumbnails"
@@ -69,12 +68,12 @@ def pictures() -> list[Picture]:
             (LARGE / f"{name}.jpg", LARGE_SIZE, FEWER_SAMPLES),
         ):
             sources = [repr((portrait(model), stage_of(model), size, spp)), stage]
-            found.append(Picture(file, partial(list, sources), partial(_draw_portrait, model, size, spp)))
+            found.append(Picture(file, partial(list, sources), saved(partial(_portrait, model, size, spp))))
         sources = [repr((main_sweep(model), stage_of(model), STRIP_SIZE, FEWER_SAMPLES)), stage]
-        found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), partial(_draw_strip, model)))
+        found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), saved(partial(strip, model), 85)))
         sources = [repr((main_sweep(model), ANGLE, DPI, FACTOR))]
         found.append(Picture(LOBES / f"{name}.png", partial(list, sources), partial(_draw_lobes, model)))
-    return [*found, Picture(GALLERY, _thumbnails, _draw_gallery)]
+    return [*found, Picture(GALLERY, _thumbnails, saved(all_thumbnails, 90))]
 
 
 def _thumbnails() -> list[str | bytes]:
@@ -84,13 +83,8 @@ def _thumbnails() -> list[str | bytes]:
     return [*names, *(file.read_bytes() for file in files if file.is_file())]
 
 
-def _draw_portrait(model: type[Model], size: int, spp: int, path: Path) -> None:
-    path.parent.mkdir(exist_ok=True)
-    shot(portrait(model), stage_of(model), size, spp).picture.save(path, quality=88, optimize=True)
-
-
-def _draw_strip(model: type[Model], path: Path) -> None:
-    strip(model).save(path, quality=85, optimize=True)
+def _portrait(model: type[Model], size: int, spp: int) -> Image.Image:
+    return shot(portrait(model), stage_of(model), size, spp).picture
 
 
 def _draw_lobes(model: type[Model], path: Path) -> None:
@@ -100,10 +94,6 @@ def _draw_lobes(model: type[Model], path: Path) -> None:
     scale = "both" if max(maxima) < FACTOR * min(maxima) else "log"
     plot.polar(*bsdfs, angles=(ANGLE,), scale=scale).savefig(path, dpi=DPI)
     Image.open(path).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=64).save(path, optimize=True)
-
-
-def _draw_gallery(path: Path) -> None:
-    all_thumbnails().save(path, quality=90, optimize=True)
 
 
 def reference() -> str:
@@ -117,12 +107,12 @@ def reference() -> str:
 
 def model_table() -> str:
     """Return the table of models in README.md."""
-    rows = ["| type | model |", "|---|---|"]
+    rows = [["type", "model"]]
     for model in own_models():
         link = f"[`{model.plugins[0]}`](mi_brdfs/models/README.md#{model.plugins[0]})"
         aliases = "".join(f", `{alias}`" for alias in model.plugins[1:])
-        rows.append(f"| {link}{aliases} | {_code(model.summary())} |")
-    return "\n".join(rows) + "\n"
+        rows.append([link + aliases, _code(model.summary())])
+    return _table(rows) + "\n"
 
 
 def _code(text: str) -> str:
