@@ -1,4 +1,4 @@
-"""Generate the plugin reference and the pictures from the models' declarations."""
+"""Generate the plugin reference, README.md's table and the pictures from the models' declarations."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ from mi_brdfs.tabulated.tabulated import Tabulated
 from .made import ROOT, Page, Picture, code, saved
 
 REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
+README = ROOT / "README.md"
+PLACE = re.compile(r"(?<=<!-- models -->\n).*?(?=<!-- end of models -->)", re.DOTALL)
+"""Of the table in README.md."""
 THUMBNAILS = ROOT / "docs" / "thumbnails"
 LARGE = THUMBNAILS / "large"
 STRIPS = ROOT / "docs" / "sweeps"
@@ -54,7 +57,7 @@ line, beside that of the first picture in orange.
 
 
 def pages() -> list[Page]:
-    return [Page(REFERENCE, reference)]
+    return [Page(REFERENCE, reference), Page(README, readme)]
 
 
 def pictures() -> list[Picture]:
@@ -105,14 +108,17 @@ def reference() -> str:
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
 
-def model_table() -> str:
-    """Return the table of models in README.md."""
+def readme() -> str:
+    """Return the text of README.md with its table of models renewed."""
     rows = [["type", "model"]]
     for model in own_models():
         link = f"[`{model.plugins[0]}`](mi_brdfs/models/README.md#{model.plugins[0]})"
         aliases = "".join(f", `{alias}`" for alias in model.plugins[1:])
         rows.append([link + aliases, _code(model.summary())])
-    return _table(rows) + "\n"
+    text, places = PLACE.subn(lambda _: f"\n{_table(rows)}\n\n", README.read_text(encoding="utf-8"))
+    if places != 1:
+        raise ValueError("README.md has no place between <!-- models --> and <!-- end of models -->.")
+    return text
 
 
 def _code(text: str) -> str:
@@ -120,10 +126,11 @@ def _code(text: str) -> str:
     return re.sub(r"``(.+?)``", r"`\1`", text)
 
 
-def strip(model: type[Model], spp: int = FEWER_SAMPLES) -> Image.Image:
+def strip(model: type[Model]) -> Image.Image:
     """Render the model's main sweep."""
-    name, main, stage = model.plugins[0], main_sweep(model), stage_of(model)
-    return sheet([sweep_row(main, stage, [shot(bsdf, stage, STRIP_SIZE, spp) for bsdf in main.bsdfs(name)])])
+    main, stage = main_sweep(model), stage_of(model)
+    shots = [shot(bsdf, stage, STRIP_SIZE, FEWER_SAMPLES) for bsdf in main.bsdfs(model.plugins[0])]
+    return sheet([sweep_row(main, stage, shots)])
 
 
 def main_sweep(model: type[Model]) -> Sweep:
@@ -147,12 +154,6 @@ def strip_picture(model: type[Model]) -> str:
     return f"[![{name}: {main.heading()}: {', '.join(main.captions())}]({file})]({file})"
 
 
-def lobes_picture(model: type[Model]) -> str:
-    """Return the picture of the lobes of a model's main sweep."""
-    name = model.plugins[0]
-    return f"![Lobes of {name} in the plane of incidence, at {ANGLE}°](../../docs/lobes/{name}.png)"
-
-
 def _overview(models: list[type[Model]]) -> str:
     cells = [f"{_picture(model)}<br>[`{model.plugins[0]}`](#{model.plugins[0]})" for model in by_family(models)]
     cells += [""] * (-len(cells) % PICTURES_PER_LINE)
@@ -164,8 +165,9 @@ def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
     given = {name: value for name, value in portrait(model).items() if name != "type"}
     about = f"*The picture at the top, in the colour of the model's family, has* `{listed(given)}`."
-    strip = f"{about}\n\n{strip_picture(model)}"
-    return _page(model, _picture(model), strip, f"### Lobes\n\n{lobes_picture(model)}")
+    name = model.plugins[0]
+    lobes = f"![Lobes of {name} in the plane of incidence, at {ANGLE}°](../../docs/lobes/{name}.png)"
+    return _page(model, _picture(model), f"{about}\n\n{strip_picture(model)}", f"### Lobes\n\n{lobes}")
 
 
 def data_page() -> str:
