@@ -57,6 +57,13 @@ def hemisphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
     return directions.hemisphere(count, seed, lowest)
 
 
+def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
+    """The same, every other one below the horizon."""
+    w = hemisphere(count, seed, lowest)
+    w[::2, 2] *= -1
+    return w
+
+
 def pairs(count: int, seed: int, lowest: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
     """Independent uniform directions ``(wi, wo)``, float64."""
     return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
@@ -170,13 +177,6 @@ def observed() -> tuple[np.ndarray, np.ndarray]:
     ]
     weights = xyz @ np.transpose(to_srgb)
     return wavelengths, weights / weights.sum(axis=0)
-
-
-def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
-    """The same, every other one below the horizon."""
-    w = hemisphere(count, seed, lowest)
-    w[::2, 2] *= -1
-    return w
 
 
 def call(method, ctx, wi, *arrays):

@@ -17,7 +17,7 @@ from mutants import BakedIn, UniformDensity, UniformSampler, lambert, mutant, ph
 from typer.testing import CliRunner
 
 import mi_brdfs
-from mi_brdfs.bench import comparison, pictures, sampling, statistics
+from mi_brdfs.bench import comparison, pictures, statistics
 from mi_brdfs.bench.comparison import compare
 from mi_brdfs.bench.pictures import first_picture, in_new_process, render_in_turn
 from mi_brdfs.bench.statistics import deviations, median_interval, time_variance
@@ -78,8 +78,8 @@ def plugin(name, model, methods=ModelBSDF):
 
 @pytest.fixture
 def small(monkeypatch):
-    sizes = {sampling: {"LOG2_POINTS": 10}, pictures: {"SIZE": 32, "ROUNDS": 7}, statistics: {"RESAMPLINGS": 200},
-             comparison: {"SIZE": 32, "FIRST_ROUNDS": 1, "LANES": 1 << 12, "CALL_ROUNDS": 7},
+    sizes = {comparison: {"SIZE": 32, "FIRST_ROUNDS": 1, "LANES": 1 << 12, "CALL_ROUNDS": 7, "LOG2_POINTS": 10},
+             pictures: {"SIZE": 32, "ROUNDS": 7}, statistics: {"RESAMPLINGS": 200},
              times: {"SIZE": 32, "FIRST_ROUNDS": 1, "FIRST_ROUNDS_OF_ALL": 1, "SCALAR_SIZE": 4, "SCALAR_SPP": 4,
                      "SCALAR_ROUNDS": 2}, resources: {"CYCLES": 60}}  # fmt: skip
     for module, values in sizes.items():
@@ -134,7 +134,7 @@ def test_one_bsdf_alone_and_what_no_other_process_knows(as_before):
     mi_brdfs.register(type("Local", (Chalk,), {"__doc__": "It cannot be imported.", "plugins": ("local",)}))
     found = compare({"type": "local"})
     names = [it.name for it in found.measurements]
-    assert names[:4] == [f"η at {angle}°" for angle in sampling.ANGLES]
+    assert names[:4] == [f"η at {angle}°" for angle in comparison.ANGLES]
     assert found.measurements[0].values == pytest.approx([0.75], abs=1e-3)
     assert names[4:] == ["eval and sample", "picture", "its variance"]
     assert not any(it.ratio for it in found.measurements)
@@ -181,8 +181,8 @@ def test_known_efficiencies(name, lobe, expected):
 def test_the_worst_azimuth_counts(monkeypatch):
     together = samplings(ANISOTROPIC)["whole"].least()
     alone = []
-    for azimuth in sampling.AZIMUTHS:
-        monkeypatch.setattr(sampling, "AZIMUTHS", (azimuth,))
+    for azimuth in comparison.AZIMUTHS:
+        monkeypatch.setattr(comparison, "AZIMUTHS", (azimuth,))
         alone.append(samplings(ANISOTROPIC)["whole"].least())
     np.testing.assert_allclose(together, np.min(alone, axis=0), atol=1e-6)
     assert np.ptp(alone, axis=0).max() > 0.01

@@ -17,8 +17,7 @@ from test_explore_page import browser as browser
 
 import mi_brdfs
 from mi_brdfs.gallery import Entry, Row, Shot, gallery, sheet, shot
-from mi_brdfs.gallery.families import MODELS, by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
+from mi_brdfs.gallery.contents import Sweep, by_family, portrait, stage_of, sweeps_of, year
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.mitsuba.registry import find_model, own_models
 from mi_brdfs.model import FAMILIES, Model
@@ -34,8 +33,7 @@ NAMES = [model.plugins[0] for model in own_models()]
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_every_model_has_a_portrait_and_sweeps():
-    """Those in the table, in the order of the models, or what its declarations make; and all of them load."""
-    assert list(MODELS["models"]) == [name for name in NAMES if name in MODELS["models"]]
+    """Those in the table, or what its declarations make; and all of them load."""
     for model in own_models():
         sweeps = sweeps_of(model)
         parameters = [sweep.parameter for sweep in sweeps]
@@ -335,10 +333,9 @@ def difference(name: str, **changes) -> float:
 
 @pytest.mark.usefixtures("llvm_rgb")
 def test_a_thumbnail_shows_its_model():
-    """And neither another lobe nor another model. Of the other models, the strips tell."""
+    """And would not show it if its diffuse lobe were darker. Of the other models, the strips tell."""
     assert difference("ward") < 4, f"ward {STALE} ward"
     assert difference("ward", diffuse_reflectance=0.03) > 8
-    assert difference("walter", type="cooktorrance") > 8
 
 
 @pytest.mark.slow
@@ -359,11 +356,6 @@ def test_strips_show_the_main_sweeps(model, monkeypatch):
         now = blocks(shot(bsdf, stage_of(model), size, 4).picture)
         off = now - blocks(committed.crop((left, top, left + size, top + size)))
         assert np.sqrt(np.square(off).mean()) < 0.01, f"{STALE} {name}"
-
-
-def test_the_picture_in_the_readme_has_all_thumbnails():
-    committed, now = blocks(Image.open(docs.GALLERY)), blocks(docs.all_thumbnails())
-    assert committed.shape == now.shape and abs(committed - now).max() < 0.02, f"{STALE} all"
 
 
 def test_pictures_are_small_and_one_of_each_model():

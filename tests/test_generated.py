@@ -2,14 +2,14 @@
 
 import pytest
 import typer
-from generate import made, models, scenes
+from generate import made, scenes
 from generate.__main__ import everything, main
 from generate.made import ROOT, Page, Picture
 from typer.testing import CliRunner
 
 import mi_brdfs
 from mi_brdfs.mitsuba import registry
-from mi_brdfs.mitsuba.registry import find_model, own_models
+from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.models.lambert import Lambert
 
 
@@ -30,17 +30,6 @@ def test_nothing_is_stale():
     assert (done.exit_code, done.stdout) == (0, ""), f"{done.output}: run python docs/generate"
     wrong = command("nothing")
     assert wrong.exit_code == 2 and "nothing is called nothing" in wrong.stderr
-
-
-def test_the_reference_says_what_its_portraits_have():
-    told = "`diffuse_reflectance = 0, specular_reflectance = (0.955, 0.638, 0.538), alpha_u = 0.05, alpha_v = 0.3`"
-    assert told in models.model_page(find_model("ward"))
-
-
-def test_the_reference_has_no_words_of_guests():
-    """Which may be installed here."""
-    page = models.reference()
-    assert "epd" in page and "student-t" not in page and "regolith" not in page
 
 
 def test_digests_are_of_the_pictures():

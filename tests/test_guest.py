@@ -12,7 +12,7 @@ from test_cli import invoke
 import mi_brdfs
 from mi_brdfs.explorer.controls import controls_of
 from mi_brdfs.fit import fit
-from mi_brdfs.gallery.sweeps import Sweep, sweeps_of
+from mi_brdfs.gallery.contents import Sweep, sweeps_of
 from mi_brdfs.mitsuba.registry import find_model
 
 pytestmark = pytest.mark.skipif(

@@ -1,14 +1,63 @@
 """The notebooks run, and do what they say."""
 
+import ast
 import json
 import re
+from functools import partial
+from unittest.mock import patch
 
+import matplotlib
+import mitsuba as mi
 import numpy as np
 import pytest
+from generate.notebooks import FOLDER, NOTEBOOKS, code_cells
+from generate.notebooks import read as read_notebook
+from support import call, context, hemisphere
 
 import mi_brdfs
+from mi_brdfs.fit import noisy, pictures
 from mi_brdfs.plot import maps
-from notebooks import FOLDER, NOTEBOOKS, code_cells, read_notebook, run_notebook
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+
+SAMPLES = 16
+"""Samples per pixel of renderings that take theirs from the scene."""
+MOST = 1 << 22
+"""The most samples of a rendering."""
+LARGE, FEW = 160**2, 4
+"""Pictures of more pixels, and those of solutions, have fewer samples per pixel: they are looked at, and not fitted or
+compared."""
+FITTED, LOOKS = 1 << 16, 2
+"""Samples of a rendering within a fit to pictures, whose noise, and sigma, are twice as large, and how often its result
+is looked at."""
+
+
+def run_notebook(path, monkeypatch):
+    """Execute the code cells of a notebook in order, in ``llvm_ad_rgb`` and in its folder; the namespace that they
+    leave."""
+    names = {}
+    monkeypatch.chdir(path.parent)
+    monkeypatch.delenv("MI_BRDFS_DATA", raising=False)  # as the committed outputs were made
+    monkeypatch.setattr(pictures, "SAMPLES", FITTED)
+    monkeypatch.setattr(noisy, "LOOKS", LOOKS)
+    with mi.variant_context("llvm_ad_rgb"):
+        for cell in code_cells(read_notebook(path)):
+            is_solution = "solution" in cell["metadata"].get("tags", ())
+            with patch("mitsuba.render", partial(grainy, is_solution=is_solution)):
+                exec(compile("".join(cell["source"]), f"{path.name}: {cell['id']}", "exec"), names)
+    plt.close("all")
+    return names
+
+
+def grainy(scene, *args, is_solution, render=mi.render, spp=SAMPLES, sensor=0, **options):
+    """``mi.render`` with fewer samples."""
+    film = (scene.sensors()[sensor] if isinstance(sensor, int) else sensor).film()
+    pixels = int(np.prod(film.size()))
+    most = FEW if is_solution or pixels > LARGE else MOST // pixels
+    return render(scene, *args, spp=min(spp, most), sensor=sensor, **options)
+
 
 # --- What they say --------------------------------------------------------------------------------------------------
 
@@ -170,8 +219,8 @@ def anatomy_of_a_microfacet_brdf(names):
 @pytest.mark.slow
 @pytest.mark.usefixtures("as_before")
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook(path):
-    names = run_notebook(path)
+def test_notebook(path, monkeypatch):
+    names = run_notebook(path, monkeypatch)
     if says := globals().get(path.stem):
         says(names)
 
@@ -230,3 +279,46 @@ def test_every_notebook_has_its_place():
     """In the list that says in which order to read them."""
     listed = re.findall(r"^\d+\. \[.*?\]\((\w+)\.ipynb\)", (FOLDER / "README.md").read_text(encoding="utf-8"), re.M)
     assert sorted(listed) == [path.stem for path in NOTEBOOKS]
+
+
+# --- The notebook on Mitsuba 0.6 ------------------------------------------------------------------------------------
+
+
+def what_is_what():
+    """The rows of its table: plugin, name in 0.6, name here, default."""
+    cells = read_notebook(FOLDER / "coming_from_mitsuba_06.ipynb")["cells"]
+    text = "\n".join("".join(cell["source"]) for cell in cells)
+    rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \| `(\w+)` \| (\S+) \|", text, re.MULTILINE)
+    return [(plugin, old, new, parsed(default)) for plugin, old, new, default in rows]
+
+
+def parsed(word):
+    try:
+        return ast.literal_eval(word.capitalize())
+    except ValueError:
+        return word
+
+
+def values(bsdf):
+    return call(bsdf.eval, context(), hemisphere(64, seed=1), hemisphere(64, seed=2))[0]
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_parameters_of_06():
+    """The old name does what the new one does, which is something, and the default is as the table says."""
+    assert len(what_is_what()) == 12
+    for plugin, old, new, default in what_is_what():
+        if isinstance(default, bool):
+            tag, other = "boolean", not default
+        elif isinstance(default, str):
+            tag, other = "string", "ward-duer"
+        else:
+            tag, other = "float", 1.5 * default
+        bsdf = f'<bsdf type="{plugin}"><{tag} name="{old}" value="{str(other).lower()}"/></bsdf>'
+        scene = mi.load_string(f'<scene version="0.6.0"><shape type="sphere">{bsdf}</shape></scene>')
+        named, alone, stated = (
+            values(mi.load_dict({"type": plugin, **it})) for it in ({new: other}, {}, {new: default})
+        )
+        np.testing.assert_array_equal(values(scene.shapes()[0].bsdf()), named, err_msg=old)
+        np.testing.assert_array_equal(alone, stated, err_msg=old)
+        assert not np.allclose(named, alone, rtol=1e-3), old

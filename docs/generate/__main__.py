@@ -10,7 +10,7 @@ import typer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from generate import balls, bench, front, models, notebooks, polarization, readme, scenes, shading
+from generate import balls, bench, front, models, notebooks, polarization, scenes, shading
 from generate.made import ROOT, Page, Picture
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # isort: skip
@@ -18,7 +18,7 @@ import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that it loads  # 
 
 def everything() -> list[Page | Picture]:
     """Return all generated files, each after its sources."""
-    pages = [*scenes.pages(), *models.pages(), *readme.pages(), *bench.pages()]
+    pages = [*scenes.pages(), *models.pages(), *bench.pages()]
     drawn = [
         *models.pictures(),
         *scenes.pictures(),

@@ -17,7 +17,7 @@ from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.parameters import published
 from mi_brdfs.preview import studio
 
-from .made import Picture, code
+from .made import Picture, code, saved
 
 FRAME, BALL, RISE, SAMPLES = 58, 42, 4, 400
 """The side of a picture and of the part around the ball, how much that lies above the middle, in pixels, and the
@@ -31,16 +31,19 @@ def pictures() -> list[Picture]:
     examples = repr([model.example() for model in own_models()])
     row = BALLS.with_name("models.jpg")
     return [
-        Picture(BALLS, partial(_sources, data, BALLS_ACROSS), partial(_draw, published_ones, BALLS_ACROSS)),
-        Picture(row, partial(_sources, examples, len(models)), partial(_draw, models, len(models))),
+        _picture(BALLS, data, published_ones, BALLS_ACROSS),
+        _picture(row, examples, models, len(models)),
     ]
 
 
-def _sources(data: str | bytes, across: int) -> list[str | bytes]:
-    return [data, repr((FRAME, BALL, RISE, SAMPLES, across)), *map(code, (preview, studio, srgb))]
+def _picture(path: Path, data: str | bytes, bsdfs: Sequence[dict], across: int) -> Picture:
+    def sources() -> list[str | bytes]:
+        return [data, repr((FRAME, BALL, RISE, SAMPLES, across)), *map(code, (preview, studio, srgb))]
+
+    return Picture(path, sources, saved(partial(_drawn, bsdfs, across), 80))
 
 
-def _draw(bsdfs: Sequence[dict], across: int, path: Path) -> None:
+def _drawn(bsdfs: Sequence[dict], across: int) -> Image.Image:
     scenes, materials = Stages(UserScene()), Materials()
     sheet = Image.new("RGB", (across * BALL, -(-len(bsdfs) // across) * BALL))
     margin = (FRAME - BALL) // 2
@@ -54,4 +57,4 @@ def _draw(bsdfs: Sequence[dict], across: int, path: Path) -> None:
         row, column = divmod(k, across)
         part = Image.fromarray(pixels[margin - RISE : margin - RISE + BALL, margin : margin + BALL])
         sheet.paste(part, (column * BALL, row * BALL))
-    sheet.save(path, quality=80, optimize=True)
+    return sheet

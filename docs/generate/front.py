@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import mi_brdfs
 from mi_brdfs import plot
@@ -33,7 +32,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from .balls import BALL
-from .made import ROOT, Picture, code
+from .made import ROOT, Picture, code, saved
 
 FOLDER = ROOT / "docs" / "pictures"
 SIZE = 640, 480
@@ -47,18 +46,13 @@ def pictures() -> list[Picture]:
         "explorer.jpg": _explorer, "lobes.png": _lobes, "fits.png": _fits, "checker.png": _checker, "globe.jpg": _globe,
         "published.jpg": _published,
     }  # fmt: skip
-    return [Picture(FOLDER / name, partial(_sources, name), partial(_save, draw)) for name, draw in made.items()]
+    return [Picture(FOLDER / name, partial(_sources, name), saved(draw)) for name, draw in made.items()]
 
 
 def _sources(name: str) -> list[str | bytes]:
     """Return what a picture is made from."""
     files = {"fits.png": [MEASURED], "globe.jpg": [GLOBE], "published.jpg": [BALLS]}.get(name, [])
     return [code(sys.modules[__name__]), *(file.read_bytes() for file in files if file.is_file())]
-
-
-def _save(draw: Callable[[], Image.Image], path: Path) -> None:
-    path.parent.mkdir(exist_ok=True)
-    draw().convert("RGB").save(path, quality=88, optimize=True)
 
 
 def _image(figure: Figure) -> Image.Image:

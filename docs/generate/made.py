@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+from PIL import Image
+
 ROOT = Path(__file__).parents[2]
 DIGESTS = ROOT / "docs" / "digests.txt"
 """The digest of each picture's sources."""
@@ -54,6 +56,16 @@ class Picture:
         for source in self.sources():
             digest.update(hashlib.sha256(source.encode() if isinstance(source, str) else source).digest())
         return digest.hexdigest()[:16]
+
+
+def saved(draw: Callable[[], Image.Image], quality: int = 88) -> Callable[[Path], None]:
+    """Return a function that draws a picture into a file, a JPEG with some quality."""
+
+    def save(path: Path) -> None:
+        path.parent.mkdir(exist_ok=True)
+        draw().save(path, quality=quality, optimize=True)
+
+    return save
 
 
 def _name(path: Path) -> str:

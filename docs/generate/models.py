@@ -1,4 +1,4 @@
-"""Generate the plugin reference and the pictures from the models' declarations."""
+"""Generate the plugin reference, README.md's table and the pictures from the models' declarations."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from PIL import Image
 
 from mi_brdfs import plot, preview
 from mi_brdfs.gallery import overview, sheet, shot, sweep_row
-from mi_brdfs.gallery.families import by_family, portrait, stage_of, year
-from mi_brdfs.gallery.sweeps import Sweep, listed, sweeps_of
+from mi_brdfs.gallery.contents import Sweep, by_family, listed, portrait, stage_of, sweeps_of, year
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import KIT, brought_terms, own_models
 from mi_brdfs.model import EXAMPLE, Model, Plugin
@@ -22,9 +21,12 @@ from mi_brdfs.preview import body, studio
 from mi_brdfs.probe.curves import in_plane_of_incidence
 from mi_brdfs.tabulated.tabulated import Tabulated
 
-from .made import ROOT, Page, Picture, code
+from .made import ROOT, Page, Picture, code, saved
 
 REFERENCE = ROOT / "mi_brdfs" / "models" / "README.md"
+README = ROOT / "README.md"
+PLACE = re.compile(r"(?<=<!-- models -->\n).*?(?=<!-- end of models -->)", re.DOTALL)
+"""Of the table in README.md."""
 THUMBNAILS = ROOT / "docs" / "thumbnails"
 LARGE = THUMBNAILS / "large"
 STRIPS = ROOT / "docs" / "sweeps"
@@ -55,7 +57,7 @@ line, beside that of the first picture in orange.
 
 
 def pages() -> list[Page]:
-    return [Page(REFERENCE, reference)]
+    return [Page(REFERENCE, reference), Page(README, readme)]
 
 
 def pictures() -> list[Picture]:
@@ -69,12 +71,12 @@ def pictures() -> list[Picture]:
             (LARGE / f"{name}.jpg", LARGE_SIZE, FEWER_SAMPLES),
         ):
             sources = [repr((portrait(model), stage_of(model), size, spp)), stage]
-            found.append(Picture(file, partial(list, sources), partial(_draw_portrait, model, size, spp)))
+            found.append(Picture(file, partial(list, sources), saved(partial(_portrait, model, size, spp))))
         sources = [repr((main_sweep(model), stage_of(model), STRIP_SIZE, FEWER_SAMPLES)), stage]
-        found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), partial(_draw_strip, model)))
+        found.append(Picture(STRIPS / f"{name}.jpg", partial(list, sources), saved(partial(strip, model), 85)))
         sources = [repr((main_sweep(model), ANGLE, DPI, FACTOR))]
         found.append(Picture(LOBES / f"{name}.png", partial(list, sources), partial(_draw_lobes, model)))
-    return [*found, Picture(GALLERY, _thumbnails, _draw_gallery)]
+    return [*found, Picture(GALLERY, _thumbnails, saved(all_thumbnails, 90))]
 
 
 def _thumbnails() -> list[str | bytes]:
@@ -84,13 +86,8 @@ def _thumbnails() -> list[str | bytes]:
     return [*names, *(file.read_bytes() for file in files if file.is_file())]
 
 
-def _draw_portrait(model: type[Model], size: int, spp: int, path: Path) -> None:
-    path.parent.mkdir(exist_ok=True)
-    shot(portrait(model), stage_of(model), size, spp).picture.save(path, quality=88, optimize=True)
-
-
-def _draw_strip(model: type[Model], path: Path) -> None:
-    strip(model).save(path, quality=85, optimize=True)
+def _portrait(model: type[Model], size: int, spp: int) -> Image.Image:
+    return shot(portrait(model), stage_of(model), size, spp).picture
 
 
 def _draw_lobes(model: type[Model], path: Path) -> None:
@@ -102,10 +99,6 @@ def _draw_lobes(model: type[Model], path: Path) -> None:
     Image.open(path).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=64).save(path, optimize=True)
 
 
-def _draw_gallery(path: Path) -> None:
-    all_thumbnails().save(path, quality=90, optimize=True)
-
-
 def reference() -> str:
     """Return the text of the plugin reference."""
     models = own_models()
@@ -115,14 +108,17 @@ def reference() -> str:
     return "\n".join(part.rstrip("\n") + "\n" for part in parts)
 
 
-def model_table() -> str:
-    """Return the table of models in README.md."""
-    rows = ["| type | model |", "|---|---|"]
+def readme() -> str:
+    """Return the text of README.md with its table of models renewed."""
+    rows = [["type", "model"]]
     for model in own_models():
         link = f"[`{model.plugins[0]}`](mi_brdfs/models/README.md#{model.plugins[0]})"
         aliases = "".join(f", `{alias}`" for alias in model.plugins[1:])
-        rows.append(f"| {link}{aliases} | {_code(model.summary())} |")
-    return "\n".join(rows) + "\n"
+        rows.append([link + aliases, _code(model.summary())])
+    text, places = PLACE.subn(lambda _: f"\n{_table(rows)}\n\n", README.read_text(encoding="utf-8"))
+    if places != 1:
+        raise ValueError("README.md has no place between <!-- models --> and <!-- end of models -->.")
+    return text
 
 
 def _code(text: str) -> str:
@@ -130,10 +126,11 @@ def _code(text: str) -> str:
     return re.sub(r"``(.+?)``", r"`\1`", text)
 
 
-def strip(model: type[Model], spp: int = FEWER_SAMPLES) -> Image.Image:
+def strip(model: type[Model]) -> Image.Image:
     """Render the model's main sweep."""
-    name, main, stage = model.plugins[0], main_sweep(model), stage_of(model)
-    return sheet([sweep_row(main, stage, [shot(bsdf, stage, STRIP_SIZE, spp) for bsdf in main.bsdfs(name)])])
+    main, stage = main_sweep(model), stage_of(model)
+    shots = [shot(bsdf, stage, STRIP_SIZE, FEWER_SAMPLES) for bsdf in main.bsdfs(model.plugins[0])]
+    return sheet([sweep_row(main, stage, shots)])
 
 
 def main_sweep(model: type[Model]) -> Sweep:
@@ -157,12 +154,6 @@ def strip_picture(model: type[Model]) -> str:
     return f"[![{name}: {main.heading()}: {', '.join(main.captions())}]({file})]({file})"
 
 
-def lobes_picture(model: type[Model]) -> str:
-    """Return the picture of the lobes of a model's main sweep."""
-    name = model.plugins[0]
-    return f"![Lobes of {name} in the plane of incidence, at {ANGLE}°](../../docs/lobes/{name}.png)"
-
-
 def _overview(models: list[type[Model]]) -> str:
     cells = [f"{_picture(model)}<br>[`{model.plugins[0]}`](#{model.plugins[0]})" for model in by_family(models)]
     cells += [""] * (-len(cells) % PICTURES_PER_LINE)
@@ -174,8 +165,9 @@ def model_page(model: type[Model]) -> str:
     """Return a model's part of the reference."""
     given = {name: value for name, value in portrait(model).items() if name != "type"}
     about = f"*The picture at the top, in the colour of the model's family, has* `{listed(given)}`."
-    strip = f"{about}\n\n{strip_picture(model)}"
-    return _page(model, _picture(model), strip, f"### Lobes\n\n{lobes_picture(model)}")
+    name = model.plugins[0]
+    lobes = f"![Lobes of {name} in the plane of incidence, at {ANGLE}°](../../docs/lobes/{name}.png)"
+    return _page(model, _picture(model), f"{about}\n\n{strip_picture(model)}", f"### Lobes\n\n{lobes}")
 
 
 def data_page() -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from .labels import Label, labelled, labels_of
-from .made import ROOT, Picture
+from .made import ROOT, Picture, saved
 from .scenes import sources
 
 SCENE = ROOT / "scenes" / "polarization" / "balls.xml"
@@ -88,9 +88,4 @@ def _strokes(s: np.ndarray, image: Image.Image) -> Image.Image:
 
 
 def pictures() -> list[Picture]:
-    return [Picture(PICTURE, partial(sources, SCENE), _draw)]
-
-
-def _draw(path: Path) -> None:
-    path.parent.mkdir(exist_ok=True)
-    picture(SCENE).save(path, quality=QUALITY, optimize=True)
+    return [Picture(PICTURE, partial(sources, SCENE), saved(partial(picture, SCENE), QUALITY))]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from mi_brdfs.gallery.families import year
+from mi_brdfs.gallery.contents import year
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model
 from mi_brdfs.parameters.xml import to_xml
@@ -23,7 +23,7 @@ from mi_brdfs.rendering.scene_file import SceneFile
 
 from . import labels
 from .labels import labelled, labels_of
-from .made import ROOT, Page, Picture, code
+from .made import ROOT, Page, Picture, code, saved
 
 SCENES = sorted((ROOT / "scenes").glob("*.xml"))
 README = ROOT / "scenes" / "README.md"
@@ -35,7 +35,7 @@ CARD = ROOT / "docs" / "pictures" / "card.jpg"
 """What other sites show of a link to the site."""
 CARD_SIZE = 1200, 630
 CARD_WORDS = "mi_brdfs", "The classical BRDFs\nas plugins for Mitsuba 3"
-WIDTH, QUALITY = 400, 88
+WIDTH = 400
 SPP, FIRST_LIGHT_SPP = 256, 32
 """As in the commands beside the pictures and in README.md's, which denoise."""
 
@@ -66,12 +66,12 @@ def pictures() -> list[Picture]:
     for path in SCENES:
         large = LARGE / f"{path.stem}.jpg"
         found += [
-            Picture(large, partial(_large_sources, path), partial(_draw, path)),
-            Picture(PICTURES / large.name, partial(_bytes, large), partial(_reduce, large)),
+            Picture(large, partial(sources, path, SPP), saved(partial(picture, path))),
+            Picture(PICTURES / large.name, partial(_bytes, large), saved(partial(_reduced, large))),
         ]
     first = FIRST_LIGHT.with_suffix(".xml")
-    found.append(Picture(FIRST_LIGHT, partial(sources, first), _draw_first))
-    return [*found, Picture(CARD, lambda: [*sources(first), repr((CARD_SIZE, CARD_WORDS))], _draw_card)]
+    found.append(Picture(FIRST_LIGHT, partial(sources, first), saved(first_light)))
+    return [*found, Picture(CARD, partial(sources, first, (CARD_SIZE, CARD_WORDS)), saved(_card))]
 
 
 def readme() -> str:
@@ -91,35 +91,22 @@ def _rendered(path: Path, spp: int, **given: int) -> Image.Image:
     return Image.fromarray(np.array(display_image(denoised(render(scene, spp)).bitmap)))
 
 
-def _large_sources(path: Path) -> list[str | bytes]:
-    return [*sources(path), repr(SPP)]
-
-
 def _bytes(path: Path) -> list[bytes]:
     return [path.read_bytes()] if path.is_file() else []
 
 
-def sources(path: Path) -> list[str | bytes]:
-    """Return what a picture of a scene is made from: the scene, and how labels are placed."""
-    return [*read(path), code(labels)]
+def sources(path: Path, *settings: object) -> list[str | bytes]:
+    """Return what a picture of a scene is made from: the scene, how labels are placed, and settings."""
+    return [*read(path), code(labels), *map(repr, settings)]
 
 
-def _draw(scene: Path, path: Path) -> None:
-    path.parent.mkdir(exist_ok=True)
-    picture(scene).save(path, quality=QUALITY, optimize=True)
-
-
-def _draw_first(path: Path) -> None:
-    first_light().save(path, optimize=True)
-
-
-def _draw_card(path: Path) -> None:
+def _card() -> Image.Image:
     width, height = CARD_SIZE
     image = first_light(width=width, height=height)
     draw = ImageDraw.Draw(image)
     for text, size, y in zip(CARD_WORDS, (80, 34), (36, 136), strict=True):
         draw.text((690, y), text, "white", ImageFont.load_default(size))
-    image.save(path, quality=QUALITY, optimize=True)
+    return image
 
 
 def first_light(**size: int) -> Image.Image:
@@ -127,10 +114,10 @@ def first_light(**size: int) -> Image.Image:
     return _rendered(FIRST_LIGHT.with_suffix(".xml"), FIRST_LIGHT_SPP, **size)
 
 
-def _reduce(large: Path, path: Path) -> None:
+def _reduced(large: Path) -> Image.Image:
     image = Image.open(large)
     size = WIDTH, round(WIDTH * image.height / image.width)
-    image.resize(size, Image.Resampling.LANCZOS).save(path, quality=QUALITY, optimize=True)
+    return image.resize(size, Image.Resampling.LANCZOS)
 
 
 def _row(path: Path) -> str:

@@ -15,12 +15,12 @@ from PIL import Image
 from PIL.ImageOps import invert
 
 from .labels import Label, labelled, labels_of
-from .made import ROOT, Picture
+from .made import ROOT, Picture, saved
 from .scenes import sources
 
 SCENES = sorted((ROOT / "scenes" / "shading").glob("*.xml"))
 PICTURES = ROOT / "docs" / "scenes" / "shading"
-LARGER, FINER, SAMPLES, QUALITY = 2, 3, 64, 88
+LARGER, FINER, SAMPLES = 2, 3, 64
 
 
 def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
@@ -40,12 +40,7 @@ def picture(path: Path, spp: int = SAMPLES) -> Image.Image:
 
 
 def pictures() -> list[Picture]:
-    return [Picture(PICTURES / f"{path.stem}.jpg", partial(_sources, path), partial(_draw, path)) for path in SCENES]
-
-
-def _sources(path: Path) -> list[str | bytes]:
-    return [*sources(path), repr(SAMPLES)]
-
-
-def _draw(scene: Path, path: Path) -> None:
-    picture(scene).save(path, quality=QUALITY, optimize=True)
+    return [
+        Picture(PICTURES / f"{path.stem}.jpg", partial(sources, path, SAMPLES), saved(partial(picture, path)))
+        for path in SCENES
+    ]

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from generate import models, scenes
 from generate.made import ROOT
 
-from mi_brdfs.gallery.families import by_family, year
+from mi_brdfs.gallery.contents import by_family, year
 from mi_brdfs.integrators.shading import Shading
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.model import Model, Plugin

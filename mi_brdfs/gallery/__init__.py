@@ -36,9 +36,8 @@ from ..probe.arrays import luminance
 from ..rendering.output import denoise, display_image, write
 from ..rendering.passes import ctrl_c
 from ..writing import write_text
-from .families import by_family, portrait, stage_of, year
+from .contents import Sweep, by_family, portrait, stage_of, sweeps_of, year
 from .sheet import Row, sheet
-from .sweeps import Sweep, sweeps_of
 
 __all__ = ["gallery"]
 

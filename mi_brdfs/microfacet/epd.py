@@ -27,7 +27,7 @@ class EPD(Isotropic):
     word = "epd"
     parameters = {"alpha": ROUGHNESS, "gamma": Number(1, (0.1, 4), "exponent γ: the lower, the longer the tail")}
     long_tailed = True
-    # tests/calibration/epd.py fits these.
+    # tests/calibration/half_vectors.py fits these.
     FAR, GROWTH = 1.7, 1.44
     """How far the law reaches, in medians, and by which ratio, to the power of each of"""
     STEPS = (-28, -12, 0, 2, 4, 6, 12)

@@ -22,7 +22,7 @@ class ForwardDirections:
     across. Where the indices differ more, z² is larger in σ, by |η² - 1|.
     """
 
-    # Fitted by tests/calibration/forward.py.
+    # Fitted by tests/calibration/half_vectors.py.
     TYPICAL = 0.6
     """Which part of the facets is less steep along ``wi`` than those that count."""
     INDISTINCT = 0.016

@@ -22,7 +22,7 @@ class VisibleNormals:
     """
 
     BIAS = 0.75
-    """l/α, fitted by tests/calibration/visible_normals.py."""
+    """l/α, fitted by tests/calibration/half_vectors.py."""
 
     def __init__(self, distribution: Distribution, wi: mi.Vector3f) -> None:
         self.distribution, self.wi = distribution, wi

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import mitsuba as mi
 import numpy as np
 
-from mi_brdfs.bench.sampling import ANGLES, Sampling, sampling
+from mi_brdfs.bench.comparison import ANGLES, Sampling, sampling
 from mi_brdfs.probe.bsdf import BSDFProbe
 
 from .cases import CASES, Case, Plugin
