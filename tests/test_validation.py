@@ -310,6 +310,7 @@ FALSE_ALARMS = {
     "a band that is empty": case(
         "gradients continuity", "toon", diffuse_threshold=1.0, diffuse_smooth=0.0, diffuse_shadow=0.9
     ),
+    "an edge at the horizon": case("gradients", "toon", diffuse_threshold=0.0, diffuse_smooth=0.0),
     "diffuse lobe beside facets": case("albedo", "walter", diffuse_reflectance=0.9, f0=0.9),
     "texels beyond a limit": case("gradients", "phong", specular_reflectance=texels(True)),
     "texels of an index down to that outside": case("gradients", "walter", int_ior=texels(True), ext_ior=0.01),

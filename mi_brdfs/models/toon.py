@@ -97,8 +97,12 @@ class Step:
 
     def _integral(self, excess: mi.Float) -> mi.Float:
         """Return the integral of S up to ``excess``; where S is 1 this is ``excess`` itself."""
-        x = self._x(self.smooth, excess)
-        return 2 * self.smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - self.smooth, 0)
+
+        def integral(smooth: mi.Float) -> mi.Float:
+            x = self._x(smooth, excess)
+            return 2 * smooth * x * x * x * (1 - 0.5 * x) + dr.maximum(excess - smooth, 0)
+
+        return leaving(0, 0.1, integral, self.smooth)
 
     def eval(self, excess: mi.Float) -> mi.Float:
         def height(smooth: mi.Float) -> mi.Float:
