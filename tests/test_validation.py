@@ -326,6 +326,9 @@ FALSE_ALARMS = {
     "a narrow lobe just below the horizon": case("pdf", "lafortune", cx=-1.5, cy=0.3, cz=-0.05, exponent=1e5),
     "an index at the low end of its range": case("colours spectral", "cooktorrance", eta=0.01, k=3.0),
     "a limit on both sides": case("gradients", "twosided", inner={"type": "walter"}),
+    "facets of no index, under no film": case(
+        "flags", "cooktorrance", int_ior="water", ext_ior="water", distribution="blinn", film_thickness=0.0
+    ),
     "facets smoother than those of a page": case("gradients", "burley", roughness=0.014, anisotropic=0.5),
     "two lobes, both black": case(
         "components", "microfacet", diffuse_reflectance=0.0, int_ior="water", ext_ior="water"

@@ -11,6 +11,7 @@ from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED, Incident
 from .outcome import Findings, Outcome, relative
+from .pairs import DARK
 from .run import SEED, Run, of_each
 
 COUNT = 4000
@@ -199,9 +200,12 @@ def _check_turned(run: Run, outcome: Outcome, part: Part) -> None:
     """Check that f and the density are the same, but for one pair in a hundred, where both directions turn about the
     normal by any angle."""
     wi = on_side(hemisphere(COUNT, 8, 0.2), part.sides[0])
-    wo = run.probe.sample(part, wi, random(COUNT, 5)).wo
+    samples = run.probe.sample(part, wi, random(COUNT, 5))
+    wo, compared = samples.wo, {"pdf": run.probe.pdf}
+    if samples.weight.mean() > DARK:
+        compared["f"] = run.probe.eval
     both = turned(wi), turned(wo)
-    for name, method in (("f", run.probe.eval), ("pdf", run.probe.pdf)):
+    for name, method in compared.items():
         before, after = (method(part, *pair).reshape(COUNT, -1).max(axis=1) for pair in ((wi, wo), both))
         lit = np.maximum(before, after) > 0
         change = relative(after, before, 1e-6, unknown=0) * lit
