@@ -490,6 +490,10 @@ def in_the_world(ctx, si, wo):
     return 0.75 + 0.25 * abs(si.n.z)
 
 
+def brighter_from_lights(ctx, si, wo):
+    return 1.1 if ctx.mode == mi.TransportMode.Importance else 1
+
+
 def suspended(own, self, *given):
     with dr.suspend_grad():
         return own(self, *given)
@@ -504,11 +508,19 @@ def tiled_in_place(own, self, ctx, si, *given):
     return own(self, ctx, si, *given)
 
 
-PairDisagrees = evaluated(
-    lambda ctx, si, wo: 1 / dr.maximum(wo.z, 0.01),
-    eval=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[0],
-    pdf=lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
-)
+ALONE = {
+    "eval": with_derivatives,
+    "pdf": lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
+}
+"""The other methods of an adapter whose ``eval_pdf`` alone is wrong."""
+PairDisagrees = evaluated(lambda ctx, si, wo: 1 / dr.maximum(wo.z, 0.01), **ALONE)
+
+
+def at_a_fixed_point(own, self, ctx, si, *given):
+    """Textures are looked up where they have their middle."""
+    there = mi.SurfaceInteraction3f(si)
+    there.uv = mi.Point2f(0.5)
+    return own(self, ctx, there, *given)
 
 
 def half_floats(own, self, *given):
@@ -831,6 +843,10 @@ MUTANTS = [
     mutant("density off for ten degrees of azimuth", "flags", diffuse(density=lit(azimuths(200, 210), 0.92))),
     mutant("not a number for exact mirror pairs", "finite", diffuse(sine_to_the_mirror)),
     mutant("eval_pdf without derivatives", "gradients", Lambert, adapted(eval_pdf=suspended, eval=with_derivatives)),
+    mutant("eval_pdf at a fixed point", "textures", Lambert, adapted(eval_pdf=at_a_fixed_point, **ALONE)),
+    mutant("eval_pdf in the world", "calls", Lambert, evaluated(in_the_world, **ALONE)),
+    mutant("eval_pdf in one mode", "mode", Lambert, evaluated(brighter_from_lights, **ALONE)),
+    mutant("eval_pdf_sample without derivatives", "gradients", Lambert, adapted(eval_pdf_sample=suspended)),
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),

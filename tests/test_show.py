@@ -139,4 +139,6 @@ def test_denoised_edges_have_no_lines():
     assert clean.shape == (45, 90)
     with pytest.raises(ValueError, match=r"shape \(height, width, 3 or 1\), not \(45, 90\)"):
         denoise(noise[..., 0])
+    with pytest.raises(ValueError, match="linear colours as floats, not uint8"):
+        denoise(np.uint8(255 * noise))
     np.testing.assert_allclose([clean[-1].mean(), clean[:, -1].mean()], 1, atol=0.005)

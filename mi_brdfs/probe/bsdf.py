@@ -194,12 +194,16 @@ class BSDFProbe:
         return np.where(self.data.seen(wi, wo)[:, None], value, np.nan) if self.data is not None else value
 
     def values(self, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> list[Value]:
-        """Return f |cosθ_o| of the whole, and what samples of each delta function alone weigh."""
+        """Return f |cosθ_o| of the whole, of ``eval`` and of ``eval_pdf``, and what samples of each delta function
+        alone weigh."""
         return self.values_at(self._at(wi, uv, len(wo)), wo)
 
     def values_at(self, si: mi.SurfaceInteraction3f, wo: Array) -> list[Value]:
         """Return these at surface points, for which :attr:`data` does not count."""
-        count, found = len(wo), [Value("eval", wo, self.bsdf.eval(self.whole.context, si, vectors(wo), True))]
+        count, ctx, towards = len(wo), self.whole.context, vectors(wo)
+        whole = self.bsdf.eval(ctx, si, towards, True), self.bsdf.eval_pdf(ctx, si, towards, True)[0]
+        dr.eval(whole)
+        found = [Value(name, wo, value) for name, value in zip(("eval", "eval_pdf's value"), whole, strict=True)]
         for part in self.deltas:
             bs, weight = self.bsdf.sample(part.context, si, *sample_arguments(random(count, 83)), True)
             found.append(Value(f"a sample's weight of {part.name}", numbers(bs.wo, count), weight))
@@ -209,9 +213,9 @@ class BSDFProbe:
         """Return the density of ``wo``."""
         return numbers(self.bsdf.pdf(part.context, self._at(wi, uv, len(wo)), vectors(wo), True), len(wo))[:, 0]
 
-    def eval_pdf(self, part: Part, wi: Array, wo: Array) -> tuple[Array, Array]:
+    def eval_pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> tuple[Array, Array]:
         """Return ``(value, pdf)``."""
-        value, pdf = self.bsdf.eval_pdf(part.context, self._at(wi, CENTRE, len(wo)), vectors(wo), True)
+        value, pdf = self.bsdf.eval_pdf(part.context, self._at(wi, uv, len(wo)), vectors(wo), True)
         return numbers(value, len(wo)), numbers(pdf, len(wo))[:, 0]
 
     def eval_pdf_sample(self, part: Part, wi: Array, wo: Array, variates: Array) -> tuple[Array, ...]:

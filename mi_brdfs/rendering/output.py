@@ -27,13 +27,16 @@ def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
 
     Raises:
         ImportError: without the extra that brings it.
-        ValueError: if the shape is another one.
+        ValueError: if the shape is another one, or they are whole numbers, as those of a PNG, which are not linear.
     """
     try:
         import mitsuba_oidn
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
-    pixels = np.array(colours, np.float32)
+    pixels = np.array(colours)
+    if np.issubdtype(pixels.dtype, np.integer):
+        raise ValueError(f"denoise takes linear colours as floats, not {pixels.dtype}")
+    pixels = pixels.astype(np.float32)
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3):
         raise ValueError(f"denoise takes colours of the shape (height, width, 3 or 1), not {pixels.shape}")
     height, width, _ = pixels.shape
@@ -90,15 +93,19 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 
 def display_image(bitmap: mi.Bitmap | ArrayLike) -> mi.Bitmap | None:
     """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours. The
-    film is given as a bitmap, or as an array of up to four channels: those of more have no names."""
-    bitmap = bitmap if isinstance(bitmap, mi.Bitmap) else mi.Bitmap(np.array(bitmap, np.float32))
+    film is given as a bitmap, or as an array of up to four channels: those of more have no names. Bytes are sRGB, as in
+    a PNG."""
+    if not isinstance(bitmap, mi.Bitmap):
+        pixels = np.array(bitmap)
+        bitmap = mi.Bitmap(pixels if pixels.dtype == np.uint8 else pixels.astype(np.float32))
     names = "".join(field.name for field in bitmap.struct_())
     formats = (mi.Bitmap.PixelFormat.RGB, mi.Bitmap.PixelFormat.XYZ, mi.Bitmap.PixelFormat.Y)
     colours = next((it for it in formats if names.startswith(it.name)), None)
     if colours is None:
         return None
     pixels = np.array(bitmap).reshape(*reversed(bitmap.size()), -1)[..., : len(colours.name)]
-    linear = mi.Bitmap(np.ascontiguousarray(pixels), colours).convert(mi.Bitmap.PixelFormat.RGB)
+    chosen = mi.Bitmap(np.ascontiguousarray(pixels), colours)
+    linear = chosen.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
     mapped = mi.Bitmap(tonemap(np.array(linear)).astype(np.float32), mi.Bitmap.PixelFormat.RGB)
     return mapped.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)
 

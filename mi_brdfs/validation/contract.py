@@ -24,6 +24,7 @@ from .run import Run, of_each, of_whole
 from .traced import gradient, traced_floats
 
 COUNT = 2000
+EVALUATED = "eval", "pdf", "eval_pdf"
 AFTER_EACH_OTHER = "eval", "eval", "pdf", "eval", "sample", "pdf", "pdf", "sample", "sample", "eval"
 """Methods in an order in which each follows each."""
 UNKNOWN = "no_such_attribute"
@@ -149,6 +150,8 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
         name = "in the mode Importance eval"
         # What grazing facets transmit is faint and has few digits.
         outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
+        name, value = "in the mode Importance eval_pdf's value", run.probe.eval_pdf(traced, wi, wo)[0]
+        outcome.differing(tolerance, name, value, got, "by eval", wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
         samples = run.probe.sample(traced, wi, random(COUNT, 67))
         # What is wrong with a weight in any mode is said once.
         if not sampling.failing(run, part, sampling.weight):
@@ -204,9 +207,9 @@ def recorded(run: Run, part: Part, outcome: Outcome) -> str:
 def calls(run: Run, part: Part, outcome: Outcome) -> str:
     """Check that calls depend on what they are given alone: ``eval``, ``pdf`` and ``sample`` return the same for the
     same arguments whatever was called before, in whatever lane, to float32's rounding, for 99 in a hundred. Where the
-    surface is turned in the world, values and densities are the same, too, as directions are local. And they leave the
-    surface point, directions and context as they are; where Python defines ``to_string``, ``str`` of the BSDF does not
-    raise; and ``has_attribute`` does not say yes to any name."""
+    surface is turned in the world, values and densities are the same, too, also of ``eval_pdf``, as directions are
+    local. And they leave the surface point, directions and context as they are; where Python defines ``to_string``,
+    ``str`` of the BSDF does not raise; and ``has_attribute`` does not say yes to any name."""
     probe = run.probe
     elsewhere = replace(probe, turned=True)
     wi, wo, u = scattered(COUNT, 76, part.sides), scattered(COUNT, 77, part.sides), random(COUNT, 78)
@@ -221,9 +224,12 @@ def calls(run: Run, part: Part, outcome: Outcome) -> str:
             wanted = {"a sample's weight": it.weight, "a sample's density": it.density[:, None]}
             lit = (it.weight != 0).any(axis=1, keepdims=True)[order]
             return {name: value[order] * lit for name, value in wanted.items()}, it.wo[order] * lit
+        if method == "eval_pdf":
+            value, density = probe.eval_pdf(part, i, o, at)
+            return {"eval_pdf's value": value[order], "eval_pdf's density": density[order, None]}, wo
         return {method: getattr(probe, method)(part, i, o, at).reshape(COUNT, -1)[order]}, wo
 
-    first = {method: called(method) for method in ("sample", "eval", "pdf")}
+    first = {method: called(method) for method in ("sample", *EVALUATED)}
 
     def compare(when: str, method: str, got: dict[str, Array], towards: Array) -> None:
         usual, usually_towards = first[method]
@@ -236,7 +242,7 @@ def calls(run: Run, part: Part, outcome: Outcome) -> str:
         order = slice(None, None, 1 if k % 2 else -1)
         before = "sample and eval" if before == "sample" else before  # as the probe calls them
         compare(f"after a call of {before} for other directions and points", method, *called(method, order=order))
-    for method in ("eval", "pdf"):
+    for method in EVALUATED:
         compare("where the surface is turned in the world", method, *called(method, elsewhere))
     # Which direction belongs to which variates may depend on the tangent, as in bumpmap: judge the samples that stay.
     (got, towards), (usual, usually_towards) = called("sample", elsewhere), first["sample"]

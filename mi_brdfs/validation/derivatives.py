@@ -237,20 +237,23 @@ def _turns(parameter: Parameter) -> bool:
 
 
 def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u: Array, expected: Array) -> None:
-    """Check the derivatives of ``eval_pdf``'s value and of ``sample``'s weight, where that of ``eval`` over pdf is
-    ``expected``."""
+    """Check the derivatives of ``eval_pdf``'s value and of the weights of ``sample`` and ``eval_pdf_sample``, where
+    that of ``eval`` over pdf is ``expected``."""
     bsdf, whole, si = run.probe.bsdf, run.probe.whole, interaction(wi)
     attached = parameter.attach()
     bs, weight = bsdf.sample(whole.context, si, *sample_arguments(u), True)
     value, density = bsdf.eval_pdf(whole.context, si, dr.detach(bs.wo), True)
+    *_, again = bsdf.eval_pdf_sample(whole.context, si, dr.detach(bs.wo), *sample_arguments(u), True)
     # Only ends of the graph keep a derivative, and the weight may depend on the direction.
-    results = bs.wo * 2, weight, value / density, value / dr.detach(density)
+    results = bs.wo * 2, weight, again, value / density, value / dr.detach(density)
     if dr.grad_enabled(results):
         _forward(attached, _along(parameter))
-    moved, of_weight, of_densities, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
-    if not np.isfinite(of_weight).all():
-        lost = 1 - np.isfinite(of_weight).mean()
-        outcome.fault(f"{lost:.1%} of the derivatives of sample's weight are not finite", np.inf)
+    moved, *of_weights, of_densities, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
+    weights = dict(zip(("sample's weight", "eval_pdf_sample's weight"), of_weights, strict=True))
+    for name, values in weights.items():
+        if not np.isfinite(values).all():
+            lost = 1 - np.isfinite(values).mean()
+            outcome.fault(f"{lost:.1%} of the derivatives of {name} are not finite", np.inf)
     size = abs(expected).mean()
     if not size > DARK:
         return
@@ -258,7 +261,7 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
     accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_densities)]
     compared = [("eval_pdf's value over pdf", of_pair, [expected])]
     if not moved.any():
-        compared.append(("sample's weight", of_weight, accepted))
+        compared += [(name, values, accepted) for name, values in weights.items()]
     for name, values, right in compared:
         error = min(abs(np.nan_to_num(values) - each).mean() for each in right)
         if error > TOLERANCE * size:
