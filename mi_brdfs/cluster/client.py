@@ -220,12 +220,10 @@ def _connected(address: str) -> Iterator[Client]:
         # A client waits for ever for the greeting of what accepts connections and is no scheduler.
         sync(runner.loop, _greet, address, callback_timeout=CONNECTING)
         client = Client(address, timeout=CONNECTING)
-    except ValueError:
-        raise ClusterError(f"{address} is not the address of a scheduler; write tcp://HOST:PORT.") from None
     except Exception:  # none, or whatever the bytes of another protocol are taken for
         raise ClusterError(
             f"No Dask scheduler of a similar version answers at {address}; give the address that `dask scheduler` "
-            "prints when it starts."
+            "prints when it starts, tcp://HOST:PORT."
         ) from None
     finally:
         runner.stop()
