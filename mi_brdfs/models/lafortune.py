@@ -28,7 +28,7 @@ class Lafortune(Model):
     * none: as in the paper and in its published fits, where the C carry the energy. The albedo of a lobe is at most
       2π ρ_l Cmax^n/(n+2), which may exceed 1.
 
-    With n = 0 a lobe is 1 up to where the cosine is 0, and jumps there.
+    With n = 0 a lobe is 1 up to where the cosine is 0, and jumps there; below about 0.2 float32 sees a jump, too.
 
     Reciprocal. Energy-conserving for ``energy`` with ρd + Σ ρ_l <= 1. For a spectral exponent, use one lobe for each
     colour. One-sided. Depolarises.
