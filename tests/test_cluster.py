@@ -330,19 +330,24 @@ def test_other_versions_are_refused(address, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes(tmp_path):
+@pytest.mark.skipif(os.name != "posix", reason="no way to stop a process there")
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGSTOP"])
+def test_a_scheduler_that_goes_or_falls_silent(how, tmp_path, monkeypatch):
+    monkeypatch.setattr(client, "SILENT", 3)
     scheduler, address = scheduler_in(tmp_path)
     worker = start("worker", address, "--nthreads", "1", "--no-nanny", folder=tmp_path)
     try:
         results = run(work, {str(number): (number,) for number in range(100)}, scheduler=address)
         next(results)
-        scheduler.kill()
+        scheduler.send_signal(getattr(signal, how))
+        begun = time.perf_counter()
         with pytest.raises(ClusterError, match=f"^The scheduler at {address} has gone.$"):
             list(results)
+        assert time.perf_counter() - begun < 20
     finally:
-        worker.kill()
-        worker.wait()
-        scheduler.wait()
+        for process in worker, scheduler:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.usefixtures("small_passes")

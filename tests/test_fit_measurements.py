@@ -234,6 +234,14 @@ def test_tells_of_ends_albedos_and_narrow_lobes():
     assert not it.resolved and any("narrower" in sentence for sentence in it.remarks())
 
 
+def test_no_more_values_than_unknowns_determine_nothing():
+    """Any noise is fitted."""
+    wi, wo, _ = measured("lambert", {"reflectance": 0.4}, 4)
+    (it,) = fit((wi, wo, np.array([0.1, 0.4, 0.2, 0.3])), "phong", given={"exponent": 10.0}, starts=1)
+    assert it.pairs == 2 and set(it.sigma.values()) == {None}
+    assert it.undetermined == ["diffuse_reflectance", "specular_reflectance"]
+
+
 @pytest.mark.slow
 def test_tells_what_the_data_do_not_determine():
     """Lafortune's factors scale each other; of Burley's sheen's tint nothing is seen where there is no sheen."""

@@ -157,7 +157,7 @@ def _subjects(targets: list[str], given: dict[str, str]) -> tuple[list[Any], lis
             values = plain({name: value_of(text) for name, text in texts.items()})
             if word in presets():
                 subject = {"type": PRESET, "name": word, **values}
-            elif is_measured(word) and os.path.exists(word):
+            elif is_measured(word):
                 sources.append(source_of(word, {}))
                 subject = {"type": MEASURED, "file": sources[-1].word, **values}
             elif not (word.startswith("<") or ".xml" in word or ".json" in word):

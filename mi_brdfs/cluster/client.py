@@ -30,6 +30,8 @@ CONNECTING = 3
 """Seconds to wait for a scheduler."""
 JOINING = 10
 """Seconds to wait for a first worker."""
+SILENT = 30
+"""Seconds without an answer after which a scheduler counts as gone."""
 ROUNDS = 4
 """How often a task is given to workers anew after those that had it died, each time as often as the scheduler allows,
 four times by default."""
@@ -149,7 +151,7 @@ class _Run:
         complete = not self.processes or self.workers >= len(self.processes.running)
         if time.monotonic() - self.asked > (LOOKING_ON if complete else LOOKING):
             try:
-                self.workers = len(self.client.nthreads())
+                self.workers = len(self.client.nthreads(callback_timeout=SILENT))
             except (OSError, TimeoutError):
                 raise ClusterError(_gone(self.client)) from None
             self.asked = time.monotonic()
@@ -158,6 +160,7 @@ class _Run:
     def _look_after_workers(self) -> None:
         if self.client.status != "running":
             raise ClusterError(_gone(self.client))
+        self._worker_count()
         if self.processes:
             self.processes.start()
             if self.processes.failures > 3 * len(self.processes.running):

@@ -95,6 +95,7 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     covariance = bread @ (scores.T @ scores + variance * before) @ bread / np.outer(scale, scale)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
     ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
+    lost |= np.count_nonzero(jacobian.any(axis=1)) <= len(unknowns)  # through so few values goes any model
     known = [k for k in range(len(unknowns)) if not ended[k] and not lost[k]]
     rows = {labels[k]: {labels[j]: float(np.clip(ratio[k, j], -1, 1)) for j in known} for k in known}
     sigma: dict[str, Any] = {}
