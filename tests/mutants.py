@@ -361,9 +361,18 @@ def drawn_otherwise_from_lights(own, self, ctx, si, u, v, active):
     return weighed_anew(self, ctx, si, bs, active)
 
 
-def red_and_blue_exchanged(texture, si, active):
-    value = texture.eval(si, active)
+def exchanged(value):
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
+
+
+def red_and_blue_exchanged(texture, si, active):
+    return exchanged(texture.eval(si, active))
+
+
+class OneOfTwoColoursExchanged(Phong):
+    def lobes(self, p):
+        p.specular_reflectance = exchanged(p.specular_reflectance)
+        return super().lobes(p)
 
 
 def outwards(texture, si, active):
@@ -1039,6 +1048,7 @@ MUTANTS = [
         in_spectra(lambda value, nm: type(value)(value[1], value[0], value[2], value[3])),
     ),
     mutant("red and blue exchanged", "colours", colour(red_and_blue_exchanged)),
+    mutant("red and blue of one colour exchanged", "colours", OneOfTwoColoursExchanged, **TWO),
     mutant("grey weights", "colours", Lambert, sampled(weight=lambda bs, w, si, u: greyed(w))),
     mutant("grey of eval_pdf", "colours", Lambert, adapted(eval_pdf=greyed_pair)),
     mutant("grey in light tracing", "colours", Lambert, adapted(eval=greyed_in_light_tracing)),

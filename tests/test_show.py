@@ -142,3 +142,7 @@ def test_denoised_edges_have_no_lines():
     with pytest.raises(ValueError, match="linear colours as floats, not uint8"):
         denoise(np.uint8(255 * noise))
     np.testing.assert_allclose([clean[-1].mean(), clean[:, -1].mean()], 1, atol=0.005)
+    noise[20, 30], noise[25, 60, 0] = np.inf, np.nan
+    found = denoise(noise)
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(noise))  # to be told of, as without
+    assert np.nanmedian(found) == pytest.approx(1, abs=0.005)

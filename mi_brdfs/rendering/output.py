@@ -23,7 +23,8 @@ IMAGES = {
 
 def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
     """Return linear RGB, shape (height, width, 3), or luminance, shape (height, width, 1), denoised by Intel's Open
-    Image Denoise. Films with a box filter give the best result, as pixels then share no samples.
+    Image Denoise. Films with a box filter give the best result, as pixels then share no samples. Values that are
+    infinite or no numbers stay, and count as 0 for those beside them.
 
     Raises:
         ImportError: without the extra that brings it.
@@ -40,9 +41,10 @@ def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3):
         raise ValueError(f"denoise takes colours of the shape (height, width, 3 or 1), not {pixels.shape}")
     height, width, _ = pixels.shape
+    finite = np.isfinite(pixels)
     # It leaves lines along the edges where sides are no multiples of 16.
-    padded = np.pad(pixels, ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
-    return mitsuba_oidn.denoise(padded, hdr=True)[:height, :width]
+    padded = np.pad(np.where(finite, pixels, 0), ((0, -height % 16), (0, -width % 16), (0, 0)), mode="symmetric")
+    return np.where(finite, mitsuba_oidn.denoise(padded, hdr=True)[:height, :width], pixels)
 
 
 def denoiser() -> Callable[[np.ndarray], np.ndarray] | None:

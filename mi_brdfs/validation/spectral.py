@@ -110,8 +110,16 @@ def spectral(run: Run, part: Part, outcome: Outcome) -> str:
 def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None:
     """Check that channels, or wavelengths, follow their own values of the colours: of ``eval``, and of the weights of
     delta functions."""
-    given, wavelengths = run.given or {}, hero_wavelengths(COUNT)
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
+    _check_colours(run, outcome, textures)
+    if mi.is_rgb and len(textures) > 1:  # exchanged channels of one are like no channel of all
+        for name, texture in textures.items():
+            _check_colours(run, outcome, {name: texture})
+
+
+def _check_colours(run: Run, outcome: Outcome, textures: dict[str, mi.Texture]) -> None:
+    """Check that of some colours, beside which the others stay as they are."""
+    given, wavelengths = run.given or {}, hero_wavelengths(COUNT)
     coloured = load(given | textures)
     wi, towards = BSDFProbe(coloured).pairs(run.probe.whole, COUNT, 84)
     si = interaction(wi, wavelengths=wavelengths)
