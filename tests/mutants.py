@@ -462,6 +462,14 @@ def follows_no_update(own, self, ctx, si, u, v, active):
     return own(self, ctx, si, u, mi.Point2f(v.x * dr.minimum(now / self.first, 1), v.y), active)
 
 
+def weighs_as_before(own, self, *given):
+    """The weight is that of the reflectance before it was set."""
+    bs, weight = own(self, *given)
+    now = self.textures["reflectance"].eval(given[1])
+    self.first = getattr(self, "first", dr.mean(now.x))
+    return bs, weight * (self.first / now.x)
+
+
 def as_bright_as_others(texture, si, active):
     """Darker where others are brighter."""
     value = texture.eval(si, active)
@@ -1061,6 +1069,7 @@ MUTANTS = [
         **TWO,
     ),
     mutant("keys exchanged", "updates", Phong, adapted(traverse=exchanged_keys), **TWO),
+    mutant("weighed as before an update", "updates", Lambert, adapted(sample=weighs_as_before)),
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),
     mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),

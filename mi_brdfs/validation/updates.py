@@ -35,7 +35,7 @@ class Drawn(NamedTuple):
 def updates(run: Run) -> Findings:
     """Check that a parameter that is set by ``mi.traverse`` and updated acts as it does if the BSDF is loaded with that
     value: ``eval``, ``pdf`` and the weights of delta functions are the same to float32's rounding, and so are
-    directions drawn, but for few. And what is set of one changes no other BSDF of the plugin; and
+    directions drawn and their weights, but for few. And what is set of one changes no other BSDF of the plugin; and
     ``parameters_changed`` without names takes up any change, and no more than with the names of texels, of tables, and
     of all parameters that are set together, as optimisers do. For this the BSDF must be given as a dict."""
     described = run.described("To load it with another value")
@@ -115,6 +115,9 @@ def _check_as_loaded(run: Run, outcome: Outcome, fresh: BSDFProbe, drawn: Drawn,
             tolerance, f"{once} pdf", ours.pdf, ours.density, why, wi, ours.wo, unknown=0, where=ours.lit, seed=SEED
         )
     # A choice among lobes may fall otherwise where a rounding error decides it.
+    pair, both = (ours.weight, loaded.weight), ours.lit & loaded.lit
+    name, tolerance = f"{once} a sample's weight", 10 * run.rounding(part)
+    outcome.differing(tolerance, name, *pair, as_loaded, wi, ours.wo, where=both, but_for=0.1, seed=SEED)
     got, expected = (each.wo * each.lit[:, None] for each in (ours, loaded))
     outcome.astray(once, got, expected, f"by the same variates {as_loaded}", wi, SEED, but_for=0.1)
 
