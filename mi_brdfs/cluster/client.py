@@ -160,7 +160,7 @@ class _Run:
     def _look_after_workers(self) -> None:
         if self.client.status != "running":
             raise ClusterError(_gone(self.client))
-        self._worker_count()
+        self._worker_count()  # or the scheduler is silent
         if self.processes:
             self.processes.start()
             if self.processes.failures > 3 * len(self.processes.running):

@@ -267,11 +267,12 @@ def _unknowns_of(
 ) -> Iterator[Unknown]:
     """Yield the unknowns of a parameter: none if it is given under any name, but the other one of a pair of which one
     is, and both of a pair for anisotropic data."""
-    given, pair = fixed.keys() & {*parameter.names}, parameter.quantities(pairs=True)
-    halved = len(given) == 1 < len(pair) and given < {it.name for it in pair} and fixed[min(given)] is not None
-    if given and not halved:
-        return
-    for quantity in (it for it in pair if it.name not in given) if halved else parameter.quantities(anisotropic):
+    given, quantities = fixed.keys() & {*parameter.names}, parameter.quantities(pairs=anisotropic)
+    if given:
+        pair = parameter.quantities(pairs=True)
+        halved = len(given) == 1 and given < {it.name for it in pair} and fixed[min(given)] is not None
+        quantities = tuple(it for it in pair if halved and it.name not in given)
+    for quantity in quantities:
         if (quantity.sought or quantity.name in freed) and (anisotropic or not quantity.turns):
             for channel in range(channels) if quantity.colour and channels > 1 else (None,):
                 yield unknown_of(quantity, channel)

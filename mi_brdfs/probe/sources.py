@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -237,8 +238,12 @@ def _class_of(bsdf: mi.BSDF) -> str:
 
 def _distinct(names: list[str]) -> list[str]:
     """Return names with a number for each of those that are alike."""
-    numbered = [f"{name} {names[: k + 1].count(name)}" for k, name in enumerate(names)]
-    return [each if names.count(name) > 1 else name for name, each in zip(names, numbered, strict=True)]
+    several, seen = Counter(names), Counter[str]()
+    numbered = []
+    for name in names:
+        seen[name] += 1
+        numbered.append(f"{name} {seen[name]}" if several[name] > 1 else name)
+    return numbered
 
 
 def _materials(scene: mi.Scene) -> list[mi.BSDF]:

@@ -113,8 +113,8 @@ def _check_channels(run: Run, outcome: Outcome, greys: dict[str, float]) -> None
     textures = {name: rgb_texture(colour["value"]) for name, colour in _coloured(greys).items()}
     _check_colours(run, outcome, textures)
     if mi.is_rgb and len(textures) > 1:  # exchanged channels of one are like no channel of all
-        for name, texture in textures.items():
-            _check_colours(run, outcome, {name: texture})
+        for name in textures:
+            _check_colours(run, outcome, {name: textures[name]})
 
 
 def _check_colours(run: Run, outcome: Outcome, textures: dict[str, mi.Texture]) -> None:
@@ -128,7 +128,7 @@ def _check_colours(run: Run, outcome: Outcome, textures: dict[str, mi.Texture]) 
         return BSDFProbe(bsdf).values_at(interaction(wi, wavelengths=wavelengths), towards)
 
     def held(*channel: int) -> mi.BSDF:
-        return load(given | {name: pinned(texture, si, *channel) for name, texture in textures.items()})
+        return load(given | {name: pinned(varying, si, *channel) for name, varying in textures.items()})
 
     got = evaluated(coloured, wavelengths)
     channels = range(got[0].value.shape[1])

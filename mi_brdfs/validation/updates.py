@@ -108,15 +108,15 @@ def _check_as_loaded(run: Run, outcome: Outcome, fresh: BSDFProbe, drawn: Drawn,
     one, other = ([*each.values(wi, wo), Value("pdf", wo, each.pdf(part, wi, wo))] for each in (run.probe, fresh))
     _compare(run, outcome, drawn, once, one, other, as_loaded)
     ours, loaded = (each.sample(part, wi, u) for each in (run.probe, fresh))
+    tolerance = 10 * run.rounding(part)
     # What sample keeps of former values shows beside pdf, which has the new ones.
-    if np.quantile(relative(loaded.pdf, loaded.density, unknown=0) * loaded.lit, 0.99) <= 10 * run.rounding(part):
-        tolerance, why = 10 * run.rounding(part), "is the density that sample states"
+    if np.quantile(relative(loaded.pdf, loaded.density, unknown=0) * loaded.lit, 0.99) <= tolerance:
+        why = "is the density that sample states"
         outcome.differing(
             tolerance, f"{once} pdf", ours.pdf, ours.density, why, wi, ours.wo, unknown=0, where=ours.lit, seed=SEED
         )
     # A choice among lobes may fall otherwise where a rounding error decides it.
-    pair, both = (ours.weight, loaded.weight), ours.lit & loaded.lit
-    name, tolerance = f"{once} a sample's weight", 10 * run.rounding(part)
+    name, pair, both = f"{once} a sample's weight", (ours.weight, loaded.weight), ours.lit & loaded.lit
     outcome.differing(tolerance, name, *pair, as_loaded, wi, ours.wo, where=both, but_for=0.1, seed=SEED)
     got, expected = (each.wo * each.lit[:, None] for each in (ours, loaded))
     outcome.astray(once, got, expected, f"by the same variates {as_loaded}", wi, SEED, but_for=0.1)
