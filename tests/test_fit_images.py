@@ -124,7 +124,7 @@ def test_a_number_that_few_pixels_decide_is_no_surer_than_others():
 
 
 def test_a_texture_that_the_scene_holds(tmp_path):
-    """Its key is its own; an optimiser has left derivatives at another one."""
+    """Its key is its own."""
     mi.Bitmap(np.full((2, 2, 1), 0.2, np.float32)).write(str(tmp_path / "grey.exr"))
     grey = f"""<texture type="bitmap" id="grey"><string name="filename" value="{tmp_path / "grey.exr"}"/>
         <boolean name="raw" value="true"/><string name="format" value="variant"/></texture>"""
@@ -138,11 +138,23 @@ def test_a_texture_that_the_scene_holds(tmp_path):
     params = mi.traverse(scene)
     (key,) = (key for key in params.keys() if key.endswith(".data"))
     params[key] = mi.TensorXf(np.full((2, 2, 1), 0.4, np.float32))
-    dr.enable_grad(params["ball.exponent.value"])
     params.update()
     found = images(scene, picture, key, iterations=5, spp=64)
     np.testing.assert_allclose(found.values[key], 0.2, atol=0.02)
     assert found.bsdfs["ball"]["type"] == "phong"
+
+
+def test_derivatives_that_an_optimiser_left():
+    """At another parameter: they would be added to those of the pictures."""
+    picture = picture_of(scene_of({"type": "ward", "alpha": 0.15}), spp=64)
+    scene = scene_of({"type": "ward", "alpha": 0.3})
+    params = mi.traverse(scene)
+    left = params["ball.bsdf.specular_reflectance.value"]
+    dr.enable_grad(left)
+    dr.set_grad(left, 100)
+    params.update()
+    found = images(scene, picture, "ball.bsdf.alpha", spp=64)
+    assert values(found)["alpha"] == pytest.approx(0.15, rel=0.05)
 
 
 def test_derivatives_of_another_scene():
@@ -174,6 +186,23 @@ def test_noise_of_a_few_pixels_is_part_of_the_uncertainty():
         found = images(scene(0.4), picture, ["ball.bsdf.alpha"], seed=seed)
         errors.append((values(found)["alpha"] - 0.2) / found.sigma["ball.bsdf.alpha.value"])
     assert np.sqrt(np.mean(np.square(errors))) < 2  # of four, once in 3000 by chance; by the squares alone 3.8
+
+
+def test_what_one_pixel_sees_is_as_sure_as_that_pixel():
+    """It leaves no residual there: without those of others, errors are five times the standard deviations."""
+    T = mi.ScalarTransform4f
+
+    def scene(reflectance):
+        card = {"type": "rectangle", "to_world": T().scale(0.08)}
+        wall = {"type": "rectangle", "to_world": T().translate([0, 0, -1]).scale(4)}
+        return scene_of({"type": "lambert", "reflectance": reflectance}, card, 9, lights=lamps(1.0) | {"wall": wall})
+
+    errors = []
+    for seed in (3, 4, 5):
+        grain = np.random.default_rng(seed).normal(1, 0.05, (9, 9, 3))
+        found = images(scene(0.5), picture_of(scene(0.3)) * grain, spp=64, seed=seed)
+        errors.append((values(found)["reflectance"] - 0.3) / found.sigma["ball.bsdf.reflectance.value"])
+    assert np.sqrt(np.mean(np.square(errors))) < 2.5  # of three, once in 3000 by chance
 
 
 @pytest.mark.slow
