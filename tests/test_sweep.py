@@ -183,9 +183,13 @@ def test_files_that_hold_no_fits_are_told_and_made_anew(tmp_path):
         assert fitted(sweep) == 2 and sweep.finished() == 4
     assert {path.name for path in (tmp_path / "results").iterdir()} == {first.name, second.name, "foreign.parquet"}
     kept = parquet.read_table(first)
-    for bsdf, told in ("[1", "Expecting"), (None, "the JSON object must be"):
-        damaged = [row | {"bsdf": bsdf} for row in kept.to_pylist()]
-        parquet.write_table(pa.Table.from_pylist(damaged, kept.schema), first)
+    for name, value, told in (
+        ("bsdf", "[1", "Expecting"),
+        ("bsdf", None, "the JSON object must be"),
+        ("albedo", "high", "Failed to parse string: 'high'"),
+    ):
+        damaged = pa.array([value] * len(kept), pa.string())
+        parquet.write_table(kept.set_column(kept.schema.get_field_index(name), name, damaged), first)
         with pytest.warns(StoreWarning, match=f"holds no fits, and is left out: {told}"):
             assert len(list(Store(tmp_path / "results").rows())) == 2
 

@@ -80,7 +80,8 @@ class Store:
                 with path.open("rb") as opened, parquet.ParquetFile(opened) as file:
                     if missing := set(SCHEMA.names) - set(file.schema_arrow.names):
                         raise ValueError(f"it has no column {min(missing)}")
-                    found = file.read(list(columns) if columns else SCHEMA.names).to_pylist()
+                    schema = pa.schema([SCHEMA.field(name) for name in columns or SCHEMA.names])
+                    found = file.read(schema.names).select(schema.names).cast(schema).to_pylist()
                 for row in found:
                     json.loads(row.get("bsdf", "{}"))
             except (OSError, TypeError, ValueError) as error:  # pa.ArrowInvalid is a ValueError
