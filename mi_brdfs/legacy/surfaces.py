@@ -83,15 +83,12 @@ def _bounded(work: Work, element: Element) -> Element:
 def _conductor(work: Work, element: Element) -> Element:
     if material := element["material"]:  # whose file some systems find in any case
         material.value = {it.lower(): it for it in conductors()}.get(material.value.lower(), material.value)
-    if element["eta"] or element["k"]:
-        _eta_and_k(work, element)
-    exterior, given = element.pop("ext_eta"), [it for it in element.of("rgb", "float") if it.name in ("eta", "k")]
-    if exterior and given:
-        for it in given:
-            element.put(times(it, [1 / _index(exterior)]))
-        work.changed(element, f"eta and k of {element.type} are divided by extEta")
-    elif exterior and not np.isclose(_index(exterior), 1, atol=1e-3):
-        work.dropped(element, "extEta beside the spectra of a metal, which are not divided by it: they are as in air")
+    exterior = element.pop("ext_eta")
+    outside = _index(exterior) if exterior else 1.0
+    if np.isclose(outside, 1, atol=1e-3):
+        outside = 1.0
+    if outside != 1 or element["eta"] or element["k"]:
+        _eta_and_k(work, element, outside)
     for it in (it for it in element.of("rgb") if it.name in ("eta", "k")):
         if len(it.numbers()) == 1:
             it.tag = "float"
@@ -114,15 +111,20 @@ def _conductor(work: Work, element: Element) -> Element:
     return _bounded(work, element)
 
 
-def _eta_and_k(work: Work, element: Element) -> None:
-    """Give a conductor that has eta or k both, and no material, which in 0.6 has the one that is not given."""
+def _eta_and_k(work: Work, element: Element, outside: float) -> None:
+    """Give a conductor eta and k, over the index outside, and no material, which in 0.6 has what is not given."""
     material = element.pop("material")
-    if missing := next((name for name in ("eta", "k") if not element[name]), ""):
-        material = material or prop("material", "Cu")
-        element.put(prop(missing, _of_material(material, missing)))
-        work.changed(element, f"{missing} of {element.type} is that of material {material.value}, as a colour")
-    elif material and material.value.lower() != "none":
+    if element["eta"] and element["k"] and material and material.value.lower() != "none":
         work.changed(element, f"material of {element.type} goes, as 0.6 takes eta and k before it")
+    material = material or prop("material", "Cu")
+    for name in ("eta", "k"):
+        it = element[name]
+        if not it:
+            it = prop(name, _of_material(material, name))
+            work.changed(element, f"{name} of {element.type} is that of material {material.value}, as a colour")
+        element.put(times(it, [1 / outside]))
+    if outside != 1:
+        work.changed(element, f"eta and k of {element.type} are divided by extEta")
 
 
 def _of_material(material: Element, name: str) -> list[float]:
