@@ -321,6 +321,8 @@ def test_a_function_of_the_script_that_runs_is_refused():
     task.__module__ = "__main__"
     with pytest.raises(ClusterError, match="task is defined in the script that runs; put it into a module"):
         run(task, {"one": ()}, workers=1)
+    with pytest.raises(ValueError, match="There cannot be -1 workers"):
+        run(task, {"one": ()}, workers=-1)
 
 
 def test_other_versions_are_refused(address, monkeypatch):

@@ -308,6 +308,7 @@ def test_runs_without_a_variant_for_it(ward):
                                                           "ward-duer or approximate."),
         ("good", "ward", {"given": {"alpha": 7.0}}, "ward: alpha = 7 is not allowed; it must be a number in"),
         ("good", "ward", {"tied": {"alpha": "beta"}}, "ward: there is no parameter beta"),
+        ("good", "ward", {"tied": {"alpha": "alpha"}}, "ward: alpha is tied, and another one to it; tie them to one"),
         ("good", "burley", {"start": {"anisotropic": 0.5}}, "isotropic data fix anisotropic; leave it out."),
         ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),

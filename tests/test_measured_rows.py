@@ -48,6 +48,27 @@ def value_at(measurement, wi, wo):
     return data.values[row].squeeze(0)
 
 
+def test_a_header_in_a_comment(tmp_path):
+    """As numpy.savetxt writes it."""
+    rows = np.array([[0, 0, 0, 0.33], [0, 10, 0, 0.32], [10, 10, 180, 0.31]])
+    np.savetxt(
+        tmp_path / "x.csv", rows, delimiter=",", header="material: paint\ntheta_i_deg,theta_o_deg,delta_phi_deg,f"
+    )
+    measurement = read(tmp_path / "x.csv")
+    assert measurement.material == "paint"
+    assert value_at(measurement, spherical(10, 0), spherical(10, 180)) == pytest.approx(0.31)
+
+
+def test_a_grid_has_nothing_below_the_horizon(tmp_path):
+    """Its angles go on there."""
+    data = as_grid(tabulated(tmp_path, range(0, 90, 20), range(0, 90, 20), range(0, 181, 20)).data)
+    above, below = spherical(30, 10), spherical(140, [20, 200])
+    assert (data.evaluate(above, below * [1, 1, -1]) > 0).all()
+    for wi, wo in (above, below), (below, above), (below, below):
+        for interpolation in "trilinear", "nearest":
+            np.testing.assert_array_equal(data.evaluate(wi, wo, interpolation), 0)
+
+
 # --- Cornell and ALTA -----------------------------------------------------------------------------------------------
 
 

@@ -216,5 +216,6 @@ def test_the_display_image_of_a_well_exposed_picture_is_plain_srgb(variant):
     pixels = np.random.default_rng(3).uniform(0, 1, (20, 30, 3)).astype(np.float32)
     plain = np.array(mi.util.convert_to_bitmap(mi.Bitmap(pixels))).astype(int)
     shown = mi.util.convert_to_bitmap(mi.Bitmap(pixels))  # bytes, which are sRGB already
-    for given in mi.Bitmap(pixels), pixels, mi.TensorXf(pixels), shown, np.array(shown):
+    fine = mi.Bitmap(pixels).convert(component_format=mi.Struct.Type.UInt16, srgb_gamma=True)
+    for given in mi.Bitmap(pixels), pixels, mi.TensorXf(pixels), shown, np.array(shown), fine:
         assert np.abs(np.array(display_image(given)).astype(int) - plain).max() <= 1

@@ -137,8 +137,11 @@ def test_denoised_edges_have_no_lines():
     noise = np.random.default_rng(1).normal(1, 0.02, (45, 90, 3)).astype(np.float32)
     clean = denoise(mi.Bitmap(noise)).mean(axis=2)
     assert clean.shape == (45, 90)
+    np.testing.assert_array_equal(denoise(np.asfortranarray(noise)), denoise(noise))
     with pytest.raises(ValueError, match=r"shape \(height, width, 3 or 1\), not \(45, 90\)"):
         denoise(noise[..., 0])
+    with pytest.raises(ValueError, match=r"not \(0, 90, 3\)"):
+        denoise(noise[:0])
     with pytest.raises(ValueError, match="linear colours as floats, not uint8"):
         denoise(np.uint8(255 * noise))
     np.testing.assert_allclose([clean[-1].mean(), clean[:, -1].mean()], 1, atol=0.005)

@@ -51,9 +51,12 @@ def run(
         worker that had it died.
 
     Raises:
+        ValueError: for a negative number of workers.
         ImportError: without the extra.
         ClusterError: see there.
     """
+    if workers is not None and workers < 0:
+        raise ValueError(f"There cannot be {workers} workers: give the number of processes to start.")
     pairs = iter(tasks.items() if isinstance(tasks, Mapping) else tasks)
     if not workers and not scheduler:
         return ((key, call(function, (*shared, *arguments))) for key, arguments in pairs)

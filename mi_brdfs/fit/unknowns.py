@@ -199,6 +199,8 @@ def configurations(
     name, known = model.plugins[0], known_names(model)
     given = {key: value for key, value in given.items() if key in known}
     tied = {key: value for key, value in tied.items() if {key, value} <= known}
+    if both := tied.keys() & set(tied.values()):
+        raise FitError(f"{name}: {min(both)} is tied, and another one to it; tie them to one that is sought.")
     words = dict[str, tuple[Any, ...]]()
     for choice, allowed in _choices(model).items():
         wanted = given.get(choice, allowed[0])

@@ -27,6 +27,8 @@ def modernize(scene: Element, minor: int, say: Callable[[Element, str], None]) -
 
 
 def _from_2(element: Element) -> None:
+    if element.tag == "shape" and element.of("luminaire") and not element.of("bsdf", "ref", "subsurface"):
+        element.children.append(plugin("bsdf", "diffuse"))  # since 0.3 it is black
     for look_at in (it for it in element.of("lookat") if "ox" in it.attributes):
         # The handedness is another, and the numbers stand apart.
         numbers = look_at.attributes

@@ -208,8 +208,8 @@ class Grid:
         interpolation: Interpolation = "trilinear",
         extrapolate: Extrapolation = "hold",
     ) -> np.ndarray:
-        """Return f, with values that mean nothing as 0, for unit vectors of shape (…, 3), or (3,) for one wi and many
-        wo: shape (…, channels).
+        """Return f, with values that mean nothing as 0, as below the horizon, for unit vectors of shape (…, 3), or (3,)
+        for one wi and many wo: shape (…, channels).
 
         Raises:
             ValueError: if a direction is no unit vector.
@@ -233,7 +233,8 @@ class Grid:
     ) -> tuple[np.ndarray, list[tuple[Any, np.ndarray]]]:
         """Return ``(values, corners)``: nodes' values, shape (nodes, channels), and the ``(index, weight)`` of those
         that f is the sum of."""
-        places, scale = self.coordinates.locate_scaled(components(wi), components(wo), NUMPY)
+        light, view = components(wi), components(wo)
+        places, scale = self.coordinates.locate_scaled(light, view, NUMPY)
         grid = self if interpolation == "nearest" else self.closed
         values, inside, varying = grid.usable, np.ones((), dtype=bool), []
         for axis, place in zip(grid.axes, places, strict=True):
@@ -243,8 +244,8 @@ class Grid:
             else:  # the same for all: one interpolation of the whole grid
                 steps = axis.steps(place, interpolation)
                 values = sum(share * values.take(k, axis=len(varying)) for k, share in steps)
-        if extrapolate == "zero":
-            scale = np.where(inside, scale, 0)
+        above = (light.z > -MARGIN) & (view.z > -MARGIN)
+        scale = np.where(above & (inside | (extrapolate == "hold")), scale, 0)
         weighed = [(index, np.asarray(weight * scale)) for index, weight in corners(varying, interpolation)]
         return values.reshape(-1, values.shape[-1]), weighed
 

@@ -34,11 +34,11 @@ def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
         import mitsuba_oidn
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
-    pixels = np.array(colours)
+    pixels = np.array(colours, order="C")
     if np.issubdtype(pixels.dtype, np.integer):
         raise ValueError(f"denoise takes linear colours as floats, not {pixels.dtype}")
     pixels = pixels.astype(np.float32)
-    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3):
+    if pixels.ndim != 3 or pixels.shape[2] not in (1, 3) or not pixels.size:
         raise ValueError(f"denoise takes colours of the shape (height, width, 3 or 1), not {pixels.shape}")
     height, width, _ = pixels.shape
     finite = np.isfinite(pixels)
@@ -96,7 +96,7 @@ def tonemap(image: np.ndarray, peak: float | None = None) -> np.ndarray:
 def display_image(bitmap: mi.Bitmap | ArrayLike) -> mi.Bitmap | None:
     """Return the tone-mapped 8-bit sRGB image of a developed film, without alpha and AOVs; None without colours. The
     film is given as a bitmap, or as an array of up to four channels: those of more have no names. Bytes are sRGB, as in
-    a PNG."""
+    a PNG, and so is a bitmap that says so."""
     if not isinstance(bitmap, mi.Bitmap):
         pixels = np.array(bitmap)
         bitmap = mi.Bitmap(pixels if pixels.dtype == np.uint8 else pixels.astype(np.float32))
@@ -107,6 +107,7 @@ def display_image(bitmap: mi.Bitmap | ArrayLike) -> mi.Bitmap | None:
         return None
     pixels = np.array(bitmap).reshape(*reversed(bitmap.size()), -1)[..., : len(colours.name)]
     chosen = mi.Bitmap(np.ascontiguousarray(pixels), colours)
+    chosen.set_srgb_gamma(bitmap.srgb_gamma())
     linear = chosen.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
     mapped = mi.Bitmap(tonemap(np.array(linear)).astype(np.float32), mi.Bitmap.PixelFormat.RGB)
     return mapped.convert(component_format=mi.Struct.Type.UInt8, srgb_gamma=True)

@@ -58,7 +58,7 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     samples = real.sample(part, wi, u := random(COUNT, 31), uv)
     wo[::2] = samples.wo[::2]
     other = BSDFProbe(load(given | constant))
-    where = "where its textures have the values of this point everywhere"
+    where = "where its textures have the values of this si.uv everywhere"
     reflectance = Value("eval_diffuse_reflectance", wo, real.diffuse_reflectance(wi, uv))
     found, few = [*real.values(wi, wo, uv), reflectance], slice(COUNT // 8)
     pinned_down = [it.value for it in other.values(wi, wo, uv)] + [other.diffuse_reflectance(wi, uv)]

@@ -6,6 +6,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +15,7 @@ import numpy as np
 from ...parameters.messages import brief
 from ..arrays import stacked
 from ..coordinates import spherical
-from ..files import TextFile, opening, shortened
+from ..files import TextFile, is_number, opening, shortened
 from ..measurement import Measurement, Quantity
 from ..rows import measured
 from ..source import Source
@@ -42,7 +43,7 @@ def recognizes(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, quantity: Quantity) -> Measurement:
-    """Read rows of angles and values below a header line.
+    """Read rows of angles and values below a header line, which may be a comment.
 
     The columns are ``theta_i``, ``phi_i`` (0 if missing), ``theta_o`` and ``phi_o``, or ``delta_phi`` for φo - φi, in
     any order, each with its unit: ``theta_i_deg``, ``theta_i_rad``, ``theta_i [deg]``; or a comment says it for all:
@@ -60,7 +61,12 @@ def read(path: Path, quantity: Quantity) -> Measurement:
     """
     file = TextFile(path)
     rows = fields(file)
-    columns = Columns(file, next(rows, []), quantity)
+    names = next(rows, [])
+    if file.comments and all(map(is_number, names)):  # numpy.savetxt makes the header a comment
+        above = split(file.comments[-1], separator(file.comments[-1]))
+        if len(above) == len(names):
+            names, rows = above, chain([names], rows)
+    columns = Columns(file, names, quantity)
     table = file.table(rows, columns.count, "as many as the header has")
     angles = {name: table[:, k] * unit for name, (k, unit) in columns.angles.items()}
     phi_i = angles.get("phi_i", np.zeros(len(table)))
