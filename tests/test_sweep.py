@@ -147,13 +147,29 @@ class Grey(Lambert):
 
 def test_a_guest_is_known_by_its_source(tmp_path, as_before):
     found = []
-    for text, shade in ((GUEST, 1), (GUEST + "# edited", 1), (GUEST, 1), (GUEST, 0.5)):
-        (tmp_path / "grey_guest.py").write_text(f"import grey_shades\n{text}", encoding="utf-8")
+    (tmp_path / "grey_parts").mkdir()
+    for text, shade, tint in ((GUEST, 1, 1), (GUEST + "# edited", 1, 1), (GUEST, 1, 1), (GUEST, 0.5, 1), (GUEST, 1, 2)):
+        (tmp_path / "grey_guest.py").write_text(f"import grey_shades, grey_parts.tints\n{text}", encoding="utf-8")
         (tmp_path / "grey_shades.py").write_text(f"SHADE = {shade}  # beside it", encoding="utf-8")
+        (tmp_path / "grey_parts" / "tints.py").write_text(f"TINT = {tint}  # below it", encoding="utf-8")
         guests.import_models(str(tmp_path / "grey_guest.py"))
         found.append(plan.versions(find_model("grey")))
-    assert found[0] == found[2] and len({*found}) == 3
-    assert plan.versions(find_model("ward")) == f"mi_brdfs {plan.__version__}, Mitsuba {mi.__version__}"
+    assert found[0] == found[2] and len({*found}) == 4
+
+
+def test_own_models_are_known_by_their_version_where_they_are_installed_and_else_by_their_sources(
+    tmp_path, monkeypatch
+):
+    ward, version = find_model("ward"), f"mi_brdfs {plan.__version__}, Mitsuba {mi.__version__}"
+    found = []
+    for folder in ("first", "second"):
+        monkeypatch.setattr(plan, "OWN", tmp_path / folder)
+        plan.OWN.mkdir()
+        (plan.OWN / "lobe.py").write_text(folder)
+        found.append(plan.versions(ward))
+    assert len({*found}) == 2 and all(it.startswith(f"{version}, sources ") for it in found)
+    monkeypatch.setattr(plan, "INSTALLED", [tmp_path])
+    assert plan.versions(ward) == version
 
 
 @pytest.mark.usefixtures("llvm_rgb", "as_before")

@@ -123,7 +123,7 @@ class Explorer:
             if len(list(Path(self.folder.name).iterdir())) >= UPLOADS:
                 raise FileError(f"There are {UPLOADS} uploaded files already; start the explorer anew.")
             payload, number = await request.read(), next(self.numbers)
-            path = Path(self.folder.name) / f"{number}{ending[0] if ending else ''}"
+            path = Path(self.folder.name) / f"upload-{number}{ending[0] if ending else ''}"
             path.write_bytes(payload)
             is_shown = path.suffix.lower() in (*LIGHTS, *MESHES)
 

@@ -227,7 +227,7 @@ def configurations(
         if not unknowns:
             raise FitError(f"{name} has nothing to fit: all its parameters are given.")
         plain = {key: word for key, word in combination.items() if word not in implied.get(key, ())}
-        passed = {key: value for key, value in fixed.items() if value is not None}
+        passed = {k: v.item() if isinstance(v, np.generic) else v for k, v in fixed.items() if v is not None}
         found.append(Configuration(model, {**plain, **passed}, combination, tuple(unknowns), dict(tied)))
     # A choice may mean nothing beside another one.
     return [

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
 import json
 import site
 import sys
+import sysconfig
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -40,8 +42,8 @@ class Sweep:
 
     A fit is known by the content of its file, the model, the metric, the seed and the settings, the variant, and the
     versions of mi_brdfs and Mitsuba, for a third-party model by the sources of its module and of those beside it: if
-    any of them changes, it is made anew. Its result depends on nothing else, neither on the other fits nor on the
-    workers.
+    any of them changes, it is made anew (:func:`versions`). Its result depends on nothing else, neither on the other
+    fits nor on the workers.
 
     Args:
         files: measured BRDFs; of two with the same content, the first counts.
@@ -186,10 +188,18 @@ def digest(data: Any) -> str:
     return hashlib.sha256(json.dumps(data).encode()).hexdigest()[:24]
 
 
+OWN = Path(__file__).parents[1]
+INSTALLED = sysconfig.get_path("stdlib"), *site.getsitepackages(), site.getusersitepackages()
+"""The folders of what has a version."""
+
+
 def versions(model: type[Model] | None = None) -> str:
-    """Return all versions that a result depends on, with a third-party model's: the sources of its module, and of those
-    that are loaded of its package or beside its file."""
+    """Return all versions that a result depends on: those of mi_brdfs, of Mitsuba, of the sources of mi_brdfs unless
+    these are installed, and of those of a third-party model: of its module, and of what is loaded of its package or,
+    unless it is installed, from the folder of its file and those in it."""
     found = f"mi_brdfs {__version__}, Mitsuba {mi.__version__}"
+    if not _is_installed(OWN):
+        found += f", sources {_sources_of(OWN)}"
     if model is None or is_own(model):
         return found
     try:
@@ -203,12 +213,24 @@ def versions(model: type[Model] | None = None) -> str:
 
 
 def _beside(module: Any) -> list[Any]:
-    """Return a module and the loaded ones of its package, or, unless it is installed, beside its file."""
-    package, folder = module.__name__.partition(".")[0], Path(inspect.getfile(module)).parent
-    installed = str(folder) in site.getsitepackages()
+    """Return a module and the loaded ones of its package, or, unless it is installed, of the folder of its file."""
+    package, path = module.__name__.partition(".")[0], Path(inspect.getfile(module))
     files = {it: Path(getattr(it, "__file__", None) or "") for it in list(sys.modules.values()) if inspect.ismodule(it)}
     found = {
-        it for it, file in files.items() if file.suffix == ".py"
-        and (it.__name__.partition(".")[0] == package or (file.parent == folder and not installed))
+        it for it, file in files.items() if file.suffix == ".py" and (
+            it.__name__.partition(".")[0] == package
+            or (path.parent in file.parents and OWN not in file.parents and not _is_installed(path, file))
+        )
     }  # fmt: skip
     return sorted({module, *found}, key=lambda it: it.__name__)
+
+
+def _is_installed(*paths: Path) -> bool:
+    """Return whether any of some paths is of what is installed."""
+    return any(Path(folder) in path.parents for folder in INSTALLED for path in paths)
+
+
+@functools.cache
+def _sources_of(folder: Path) -> str:
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return digest([(str(path.relative_to(folder)), content_hash(path)) for path in files])
