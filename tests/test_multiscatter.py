@@ -85,7 +85,8 @@ def test_nor_by_the_published_ways(way):
 def test_the_colour_is_that_of_a_walk(alpha):
     """The albedo is that of simulated walks, to .005 up to 60° and .02 at 80°, besides three standard errors; to more
     of a film, and of a reflectance that is far from Schlick's. The azimuth is that of smooth facets, which are seen at
-    grazing angles again and again."""
+    grazing angles again and again. With either term of Smith's."""
+    shadowing = "smith" if alpha[0] == alpha[1] else "smith-correlated"
     angles, azimuth, rng = (5, 45, 60, 80), 90, np.random.default_rng(1)
 
     def every(cos):
@@ -94,7 +95,7 @@ def test_the_colour_is_that_of_a_walk(alpha):
     walks = [walk("ggx", *alpha, direction(theta, azimuth), every, 100_000, rng) for theta in angles]
     for k, (name, (given, _)) in enumerate(FRESNEL.items()):
         near, far = {"film": (0.025, 0.03), "exponent 1": (0.02, 0.03)}.get(name, (0.005, 0.02))
-        ours = albedos(facets("walk", alpha, **given), angles, azimuth)
+        ours = albedos(facets("walk", alpha, shadowing=shadowing, **given), angles, azimuth)
         for albedo, theta, (energy, error) in zip(ours, angles, walks, strict=True):
             noise = 3 * np.sqrt((error[:, k] ** 2).sum(axis=0))
             wrong = abs(albedo - energy[:, k].sum(axis=0)) > (near if theta <= 60 else far) + noise

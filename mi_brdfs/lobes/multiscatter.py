@@ -135,6 +135,8 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     way, smith = model.parameters.chosen.get("multiscatter", "none"), lobe.shadowing
     if way == "none" or not isinstance(smith, Smith):
         return (lobe,)
+    if way == "walk":
+        smith.correlated = True  # as the walk's first reflection is
     if not model.captured:
         model.captured += [table(smith), model.uniform.kept]
 
