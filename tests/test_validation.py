@@ -235,6 +235,47 @@ def test_light_through_a_sheet_goes_back_as_it_came(behind):
     assert check(sheet, only="reciprocity").verdict("reciprocity") == ("pass" if behind == 1 else "fail")
 
 
+def at_other_places(si):
+    other = mi.SurfaceInteraction3f(si)
+    other.uv = 1 - si.uv
+    return other
+
+
+BEHIND = {
+    "gradients": lambda self, si: dr.detach(self.back.eval(si)),
+    "textures": lambda self, si: self.back.eval(at_other_places(si)),
+    "updates": lambda self, si: mi.Color3f(self.kept),
+    "colours": lambda self, si: mi.Color3f(*reversed(self.back.eval(si))),
+}
+
+
+@pytest.mark.parametrize("named", [None, *BEHIND])
+def test_the_back_is_looked_at(named):
+    """Of a sheet with a texture on each side, with a fault of that on the back."""
+
+    def begin(self, props):
+        self.front, self.back = props.get_texture("front", 0.3), props.get_texture("back", 0.6)
+        self.kept = self.back.mean()
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        colour = BEHIND[named](self, si) if named else self.back.eval(si)
+        pdf = dr.select(active & (si.wi.z * wo.z > 0), dr.abs(wo.z) * dr.inv_pi, 0)
+        return dr.select(si.wi.z > 0, self.front.eval(si), colour) * pdf, pdf
+
+    def draw(si, v):
+        up = mi.warp.square_to_cosine_hemisphere(v)
+        return mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, up.z, -up.z))
+
+    def traverse(self, callback):
+        for name in "front", "back":
+            callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+    sheet = stranger("two_colours", DIFFUSE | BOTH_SIDES, begin=begin, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
+    report = check(sheet, only=list(BEHIND))
+    failed = [it for it in BEHIND if report.verdict(it) == "fail"]
+    assert failed == {None: [], "updates": ["textures", "updates"]}.get(named, [named]), report
+
+
 @pytest.mark.slow
 def test_a_dict_is_checked_where_no_variant_is_active():
     code = "import mi_brdfs; print(mi_brdfs.validation.check({'type': 'lambert'}, only=['weight']).passed)"

@@ -51,8 +51,8 @@ class Burley(Model):
 
     Reciprocal, except for ``multiscatter`` = turquin. Not energy-conserving: for C = 1 the albedo reaches 1.19 with the
     defaults, 1.60 for roughness = 1 and, with everything else switched on, 1.82 for roughness = 0 and 1.88 along dp_dv
-    for roughness = 0.17 and anisotropic = 1, all beyond 80°; with metallic = 1 it stays below 1, and below 1.05 with a
-    clear coat. One-sided. Depolarises.
+    for roughness = 0.17 and anisotropic = 1 (2.1 with walk), all beyond 80°; with metallic = 1 it stays below 1, and
+    below 1.05 with a clear coat. One-sided. Depolarises.
 
     Sampling: for the base lobe the cosine with a few uniform directions, for the sheen a density of its own, for the
     clear coat an antithetic pair of half vectors and for the specular lobe one of visible normals, one of the pair

@@ -53,6 +53,10 @@ class Part(NamedTuple):
         """Return whether a flag is among those of the part."""
         return bool(self.flags & int(flag))
 
+    def around(self, count: int, seed: int) -> Array:
+        """Draw directions all over the sides that it is seen from."""
+        return on_side(hemisphere(count, seed), np.random.default_rng([seed, 1]).choice(self.sides, count))
+
     @property
     def passages(self) -> list[tuple[int, int]]:
         """The sides that light may go from and to, and back."""
@@ -249,9 +253,10 @@ class BSDFProbe:
     def pairs(
         self, part: Part, count: int, seed: int, sides: tuple[int, int] | None = None, uv: ArrayLike = CENTRE
     ) -> tuple[Array, Array]:
-        """Return directions all over a side, by default the first that a part is seen from, and others on the same or
-        another side, half of them as they are drawn."""
-        side, other = sides or (part.sides[0],) * 2
+        """Return directions all over a side, and others on the same or another side, half of them as they are drawn; by
+        default of all the ways that light may go."""
+        ways = [sides] if sides else part.passages or [(side, side) for side in part.sides]
+        side, other = np.random.default_rng(seed).choice(ways, count).T
         wi, wo = on_side(hemisphere(count, seed), side), on_side(hemisphere(count, seed + 1), other)
         drawn = self.sample(part, wi, random(count, seed + 2), uv).wo
         near = (np.arange(count) % 2 == 0) & (drawn[:, 2] * other > 0.01)

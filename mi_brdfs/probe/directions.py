@@ -19,9 +19,9 @@ def direction(theta: ArrayLike, phi: ArrayLike = 0) -> Array:
     return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], np.float32)
 
 
-def on_side(w: Array, side: int) -> Array:
-    """Return directions above the horizon, or for a side of -1 their mirror images below."""
-    return w * np.array([1, 1, side], np.float32)
+def on_side(w: Array, side: ArrayLike) -> Array:
+    """Return directions above the horizon, or for a side of -1 their mirror images below; each may have its side."""
+    return w * np.stack(np.broadcast_arrays(1, 1, side), axis=-1).astype(np.float32)
 
 
 def hemisphere(count: int, seed: int, lowest: float = 0.01) -> Array:
@@ -30,6 +30,11 @@ def hemisphere(count: int, seed: int, lowest: float = 0.01) -> Array:
     z, phi = rng.uniform(lowest, 1, count), rng.uniform(0, 2 * np.pi, count)
     sin = np.sqrt(1 - z * z)
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), z], axis=-1).astype(np.float32)
+
+
+def beside(w: Array, seed: int) -> Array:
+    """Draw such directions on the sides that others are on."""
+    return on_side(hemisphere(len(w), seed), np.sign(w[:, 2]))
 
 
 def scattered(count: int, seed: int, sides: Sequence[int]) -> Array:

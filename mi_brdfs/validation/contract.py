@@ -15,7 +15,7 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe, Part
-from ..probe.directions import hemisphere, on_side, scattered
+from ..probe.directions import beside, hemisphere, on_side, scattered
 from ..probe.variates import random
 from . import sampling
 from .deltas import deltas
@@ -37,8 +37,7 @@ def active(run: Run, part: Part, outcome: Outcome) -> str:
     ``eval_diffuse_reflectance`` of plugins of ours (Mitsuba's own rely on it that calls of a scene mask them); others
     get what they get when all are active. And no derivative comes from them, whatever directions they have."""
     probe, wi, u = run.probe, scattered(COUNT, 61, part.sides), random(COUNT, 62)
-    wo = np.where(np.arange(COUNT)[:, None] % 3, probe.sample(part, wi, u).wo,
-                  on_side(hemisphere(COUNT, 63), part.sides[0]))  # fmt: skip
+    wo = np.where(np.arange(COUNT)[:, None] % 3, probe.sample(part, wi, u).wo, beside(wi, 63))
     half = np.random.default_rng(64).random(COUNT) < 0.5
     every = _results(probe, wi, wo, u, True)
     for mask, lit, words in (

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..parameters import Range, nested
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
-from ..probe.directions import hemisphere, on_side
+from ..probe.directions import beside
 from ..probe.variates import random
 from ..ranges import declared, limits_of
 from .differences import ROUNDING, Differences, differences
@@ -67,13 +67,12 @@ def gradients(run: Run) -> Findings:
 def _drawn(run: Run) -> tuple[Pairs, Array]:
     """Return pairs as the whole draws them, and the variates that it draws them by; if it is black, as it may be until
     a parameter changes, uniform ones, and no variates."""
-    side = run.probe.whole.sides[0]
-    wi, u = on_side(hemisphere(COUNT, 12), side), random(COUNT, 13)
+    wi, u = run.probe.whole.around(COUNT, 12), random(COUNT, 13)
     samples = run.probe.sample(run.probe.whole, wi, u)
-    kept = samples.drawn & (samples.pdf > 0) & (wi[:, 2] * side > 0.05)
+    kept = samples.drawn & (samples.pdf > 0) & (abs(wi[:, 2]) > 0.05)
     if kept.any():
         return Pairs(wi[kept], samples.wo[kept], 1 / samples.pdf[kept, None]), u[kept]
-    return Pairs(wi, on_side(hemisphere(COUNT, 14), side), np.full((COUNT, 1), 2 * np.pi)), u[:0]
+    return Pairs(wi, beside(wi, 14), np.full((COUNT, 1), 2 * np.pi)), u[:0]
 
 
 def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:

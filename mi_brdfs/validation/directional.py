@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array, interaction, numbers, vectors
-from ..probe.directions import hemisphere, on_side
+from ..probe.directions import beside
 from .differences import differences
 from .outcome import Outcome
 from .pairs import DARK, Pairs, compare_differences, differentiate_sum, disagreement, edges_of, light_of
@@ -25,9 +25,8 @@ def directional(run: Run, pairs: Pairs | None) -> Finding:
     those of ``eval`` are those of finite differences for some ``pairs``, if there are any."""
     outcome, probe, part = Outcome("gradients", "wi and wo"), run.probe, run.probe.whole
     wi, wo, _ = edges_of(part)
-    some, others = (on_side(hemisphere(500, seed), part.sides[0]) for seed in (15, 16))
-    mirrored = wi * np.array([-1, -1, 1], np.float32)
-    wi, wo = np.concatenate([wi, wi, some, some]), np.concatenate([wo, mirrored, some, others])
+    some, mirrored = part.around(500, 15), wi * np.array([-1, -1, 1], np.float32)
+    wi, wo = np.concatenate([wi, wi, some, some]), np.concatenate([wo, mirrored, some, beside(some, 16)])
     for name, method in (("eval", probe.bsdf.eval), ("pdf", probe.bsdf.pdf)):
         si, towards = interaction(wi), vectors(wo)
         dr.enable_grad(si.wi, towards)

@@ -45,8 +45,9 @@ class Pairs(NamedTuple):
 def edges_of(part: Part) -> Pairs:
     """Return pairs of directions where formulas break: normal, grazing, mirrored, equal."""
     edge = np.array([direction(t, phi) for t in (0, 1e-3, 45, 89, 89.9, 89.99) for phi in (0, 50, 180)])
-    edge = on_side(edge, part.sides[0])
-    return Pairs(np.repeat(edge, len(edge), axis=0), np.tile(edge, (len(edge), 1)), np.ones((len(edge) ** 2, 1)))
+    ways = np.repeat(edge, len(edge), axis=0), np.tile(edge, (len(edge), 1))
+    wi, wo = (np.concatenate([on_side(w, side) for side in part.sides]) for w in ways)
+    return Pairs(wi, wo, np.ones((len(wi), 1)))
 
 
 def differentiate_sum(values: Any, pairs: Pairs) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe, Part, Value, load
-from ..probe.directions import hemisphere, on_side
+from ..probe.directions import beside
 from ..probe.variates import random
 from .incidents import all_over
 from .outcome import Outcome, Skipped, skipping
@@ -46,9 +46,10 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     name = "_".join([*mi.variant().split("_")[:2], "spectral", "polarized"])
     if name not in mi.variants():
         raise Skipped(f"It takes the variant {name}.")
-    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (101, 102))
+    wi = part.around(COUNT, 101)
+    wo = beside(wi, 102)
     # About the mirror direction, where most BSDFs that polarize have their light.
-    near = wi * [-1, -1, 1] + 0.1 * hemisphere(COUNT, 103)
+    near = wi * [-1, -1, 1] + 0.1 * beside(wi, 103)
     wo[::2] = (near / np.linalg.norm(near, axis=1, keepdims=True))[::2]
     with mi.variant_context(name), skipping(f"It does not work in {name}: "):
         bsdf, mueller = load(described), _mueller if run.probe.parts else _weight

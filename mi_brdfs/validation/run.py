@@ -98,12 +98,12 @@ class Run:
     def spread(self, part: Part) -> float:
         """Return how narrow a part is, in radians: for light from 30°, the distance over which the density falls to a
         half from where it is highest, in the direction in which it falls fastest, as across a line of brushed metal. Of
-        the whole, that of its narrowest component counts.
+        the whole, that of its narrowest component counts, and of two sides that of the narrower one.
         """
         if part.component is None and len(self.probe.components) > 1:
             return min(self.spread(each) for each in self.probe.components)
         if part.name not in self._spreads:
-            self._spreads[part.name] = _half_width(self.probe, part)
+            self._spreads[part.name] = min(_half_width(self.probe, part, side) for side in part.sides)
         return self._spreads[part.name]
 
     def rounding(self, part: Part) -> float:
@@ -170,9 +170,10 @@ of_parts = of_each(lambda probe: probe.parts)
 of_whole = of_each(lambda probe: [probe.whole])
 
 
-def _half_width(probe: BSDFProbe, part: Part) -> float:
-    """Return the median, over the samples of the highest density, of the distance at which that falls to a half."""
-    wi = on_side(direction(30), part.sides[0])
+def _half_width(probe: BSDFProbe, part: Part, side: int) -> float:
+    """Return the median, over the samples of the highest density for light from a side, of the distance at which that
+    falls to a half."""
+    wi = on_side(direction(30), side)
     samples = probe.sample(part, wi, random(1 << 12, 1))
     drawn = np.flatnonzero(samples.drawn)
     if len(drawn) < 64:

@@ -12,7 +12,6 @@ from ..mitsuba.errors import unwrapped_ctrl_c
 from ..parameters.colours import rgb_texture
 from ..probe.arrays import Array, hero_wavelengths, interaction, numbers, pinned, texture
 from ..probe.bsdf import BSDFProbe, Part, Value, load
-from ..probe.directions import hemisphere, on_side
 from . import contract, sampling, values
 from .outcome import Outcome, Skipped, relative, skipping, told
 from .run import Run, anywhere, failures, of_whole, tell
@@ -209,7 +208,7 @@ def _greys(probe: BSDFProbe, given: dict[str, Any]) -> dict[str, float]:
     try:
         with unwrapped_ctrl_c():
             bsdf = load(given | {name: asking(name, grey) for name, grey in greys.items()})
-            wi = on_side(hemisphere(1, 87), probe.whole.sides[0])
+            wi = probe.whole.around(16, 87)
             BSDFProbe(bsdf).values(wi, wi)
     except (RuntimeError, TypeError):
         return {}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..probe.arrays import Array, interaction, numbers, pinned
 from ..probe.bsdf import BSDFProbe, Samples, Value, load
-from ..probe.directions import hemisphere, on_side
+from ..probe.directions import beside
 from ..probe.variates import random
 from . import sampling
 from .outcome import Findings, Outcome, Skipped, relative
@@ -52,7 +52,8 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     faults."""
     part, given, tolerance = run.probe.whole, run.given or {}, 3 * run.rounding(run.probe.whole)
     uv = np.random.default_rng(33).uniform(-1, 2, (COUNT, 2)).astype(np.float32)
-    wi, wo = (on_side(hemisphere(COUNT, seed), part.sides[0]) for seed in (30, 32))
+    wi = part.around(COUNT, 30)
+    wo = beside(wi, 32)
     constant = {name: pinned(texture, interaction(wi, uv)) for name, texture in varied.items()}
     real = BSDFProbe(load(given | constant | {name: varied[name] for name in free}))
     samples = real.sample(part, wi, u := random(COUNT, 31), uv)

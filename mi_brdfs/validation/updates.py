@@ -12,7 +12,6 @@ import numpy as np
 from ..mitsuba.errors import unwrapped_ctrl_c
 from ..probe.arrays import Array, launched_kernels, numbers
 from ..probe.bsdf import BSDFProbe, Value, load
-from ..probe.directions import hemisphere, on_side
 from ..probe.variates import random
 from .outcome import Findings, Outcome, relative
 from .report import Finding
@@ -40,7 +39,7 @@ def updates(run: Run) -> Findings:
     of all parameters that are set together, as optimisers do. For this the BSDF must be given as a dict."""
     described = run.described("To load it with another value")
     parameters, _ = traced_floats(run, "updates")
-    wi, u = on_side(hemisphere(COUNT, 91), run.probe.whole.sides[0]), random(COUNT, SEED)
+    wi, u = run.probe.whole.around(COUNT, 91), random(COUNT, SEED)
     drawn = Drawn(wi, run.probe.sample(run.probe.whole, wi, u).wo, u)
     findings = [finding for each in parameters if (finding := _updated(run, each, described, drawn))]
     if len(findings) > 1:
@@ -143,7 +142,7 @@ def recompiles(run: Run) -> Findings:
     """Check that a new value of a parameter compiles no kernel, after its first update."""
     parameters, findings = traced_floats(run, "recompiles")
     yield from findings
-    wi, u = on_side(hemisphere(64, 1), run.probe.whole.sides[0]), random(64, 2)
+    wi, u = run.probe.whole.around(64, 1), random(64, 2)
 
     def launched(parameter: Parameter, value: Any) -> set[int]:
         dr.make_opaque(value)
