@@ -46,7 +46,7 @@ def albedo(bsdf, **options):
 @pytest.mark.slow
 def test_what_gains_as_much_as_its_page_says_is_noted():
     """Also on two sides. Unless energy is to be conserved. No page says that one of Mitsuba's gains any."""
-    words = "It gains energy, as {} says (2.1): light from 89° is reflected 1.19"
+    words = "It gains energy, as {} says (2.10): light from 89° is reflected 1.19"
     for bsdf, who in ((WHITE, "its page"), ({"type": "twosided", "inner": WHITE}, "the page of burley")):
         found = albedo(bsdf)
         assert found.verdict == "note" and found.message.startswith(words.format(who)), found
@@ -370,7 +370,7 @@ def test_command_with_its_options(tmp_path):
     given += ["--angles", "5,83"]
     done = run(*given, "--junit", tmp_path / "x.xml", "--significance", "0.05")
     assert done.exit_code == 0 and "burley base_color=1.0 roughness=1: passed" in done.stdout
-    assert "It gains energy, as its page says (2.1)" in " ".join(done.stdout.split())
+    assert "It gains energy, as its page says (2.10)" in " ".join(done.stdout.split())
     assert ElementTree.parse(tmp_path / "x.xml").getroot().get("failures") == "0"
     done = run(*given, "--conserves")
     again = done.stdout.splitlines()[-1].strip()
