@@ -325,6 +325,20 @@ def test_a_function_of_the_script_that_runs_is_refused():
         run(task, {"one": ()}, workers=-1)
 
 
+def test_a_worker_that_has_loaded_other_sources_is_refused(address, tmp_path, as_before):
+    """It does not load what a model imports anew, and would call what was there."""
+    (tmp_path / "tinted.py").write_text(
+        "import tints_beside\nfrom mi_brdfs.models.lambert import Lambert\n"
+        'class Tinted(Lambert):\n    """Tinted."""\n    plugins = ("tinted",)\n'
+    )
+    (tmp_path / "tints_beside.py").write_text("TINT = 1")
+    guests.import_models(str(tmp_path / "tinted.py"))
+    assert dict(run(work, {"one": (1,)}, scheduler=address)).keys() == {"one"}
+    (tmp_path / "tints_beside.py").write_text("TINT = 2")
+    with pytest.raises(ClusterError, match=r"has loaded another tints_beside than this process: restart it, with"):
+        dict(run(work, {"one": (1,)}, scheduler=address))
+
+
 def test_other_versions_are_refused(address, monkeypatch):
     monkeypatch.setattr(mi_brdfs.cluster.worker, "__version__", "9.9")
     with pytest.raises(ClusterError, match=r"The worker at tcp://\S+ has mi_brdfs 0.1.0, this process has 9.9\.$"):

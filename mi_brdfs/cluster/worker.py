@@ -9,6 +9,7 @@ import platform
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -33,9 +34,13 @@ class Setup(NamedTuple):
     guests: dict[str, str | None]
     """The sources of others' models (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of files."""
     versions: dict[str, str]
+    sources: dict[str, str]
+    """The digests of modules that are not installed, and so may change while they have the same version."""
 
 
 _current: Setup | None = None
+_loaded: dict[ModuleType, str] = {}
+"""The digests of a worker's modules when it had loaded them: those of their files may be others now."""
 
 
 def versions() -> dict[str, str]:
@@ -51,7 +56,16 @@ def setup(threads: int | None) -> Setup:
     files = {
         each: Path(each).read_text(encoding="utf-8") if each.endswith(".py") else None for each in guests.sources()
     }
-    return Setup(mi.variant(), threads, files, versions())
+    return Setup(mi.variant(), threads, files, versions(), {it.__name__: text for it, text in sources().items()})
+
+
+def sources() -> dict[ModuleType, str]:
+    """Return the digests of the files of all loaded modules that are not installed, but for the script that runs."""
+    found = {}
+    for module, file in guests.loaded_sources().items():
+        if module.__name__ != "__main__" and not guests.is_installed(file) and file.is_file():
+            found[module] = hashlib.sha256(file.read_bytes()).hexdigest()
+    return found
 
 
 def call(function: Callable, arguments: tuple) -> Any:
@@ -88,6 +102,11 @@ def _prepare(wanted: Setup) -> None:
         mi.set_variant(wanted.variant)
     for source, text in wanted.guests.items():
         guests.import_models(source if text is None else _file(source, text))
+    for module, digest in sources().items():
+        loaded = _loaded.setdefault(module, digest)
+        if wanted.sources.get(module.__name__, loaded) != loaded:
+            told = f"has loaded another {module.__name__} than this process: restart it, with the same files"
+            raise RuntimeError(f"The worker at {get_worker().address} {told}.")
     if wanted.threads is not None:
         dr.set_thread_count(max(wanted.threads, 2))  # with one, Mitsuba waits forever for its bitmaps
     _current = wanted

@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import importlib.util
+import site
 import sys
+import sysconfig
 import traceback
 import warnings
 from contextlib import suppress
@@ -23,6 +25,8 @@ from .registry import all_models, brought_terms, is_own, models_in, register, te
 
 ENTRY_POINTS = "mi_brdfs.models"
 """The entry-point group for models of installed packages."""
+INSTALLED = sysconfig.get_path("stdlib"), *site.getsitepackages(), site.getusersitepackages()
+"""The folders of what is installed."""
 _files: dict[str, str] = {}
 """The files imported by path, by module name."""
 _of_bsdfs: list[str] = []
@@ -106,6 +110,17 @@ def sources() -> list[str]:
     brought: list[Any] = [*brought_terms().values(), *(model for model in all_models() if not is_own(model))]
     found = [*map(source, brought), *(_files.get(name, name) for name in _of_bsdfs)]
     return [each for each in dict.fromkeys(found) if each]
+
+
+def loaded_sources() -> dict[ModuleType, Path]:
+    """Return the files of all modules that are loaded from one in Python."""
+    modules = [it for it in sys.modules.values() if isinstance(it, ModuleType)]
+    return {it: file for it in modules if (file := Path(getattr(it, "__file__", None) or "")).suffix == ".py"}
+
+
+def is_installed(*paths: Path) -> bool:
+    """Return whether any of some paths is of what is installed, and so has a version."""
+    return any(Path(folder) in path.parents for folder in INSTALLED for path in paths)
 
 
 def _of_file(path: Path) -> ModuleType:

@@ -6,9 +6,6 @@ import functools
 import hashlib
 import inspect
 import json
-import site
-import sys
-import sysconfig
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -22,7 +19,7 @@ from ..cluster import Failed, run
 from ..fit import STARTS, Observations, find_metric, fit, observe
 from ..fit.observations import CUT
 from ..measured.files import FileError, checked, content_hash
-from ..mitsuba.guests import source
+from ..mitsuba import guests
 from ..mitsuba.registry import find_models, is_own
 from ..model import Model
 from .store import Store, row_of
@@ -119,7 +116,7 @@ class Sweep:
             ValueError: if workers are asked for, and a model is defined in the script that runs.
         """
         for model in find_models(self.models) if workers or scheduler else ():
-            if not is_own(model) and not source(model):
+            if not is_own(model) and not guests.source(model):
                 raise ValueError(
                     f"{model.plugins[0]} is defined in the script that runs; put it into a module, to be imported by "
                     "workers."
@@ -189,8 +186,6 @@ def digest(data: Any) -> str:
 
 
 OWN = Path(__file__).parents[1]
-INSTALLED = sysconfig.get_path("stdlib"), *site.getsitepackages(), site.getusersitepackages()
-"""The folders of what has a version."""
 
 
 def versions(model: type[Model] | None = None) -> str:
@@ -198,7 +193,7 @@ def versions(model: type[Model] | None = None) -> str:
     these are installed, and of those of a third-party model: of its module, and of what is loaded of its package or,
     unless it is installed, from the folder of its file and those in it."""
     found = f"mi_brdfs {__version__}, Mitsuba {mi.__version__}"
-    if not _is_installed(OWN):
+    if not guests.is_installed(OWN):
         found += f", sources {_sources_of(OWN)}"
     if model is None or is_own(model):
         return found
@@ -215,19 +210,11 @@ def versions(model: type[Model] | None = None) -> str:
 def _beside(module: Any) -> list[Any]:
     """Return a module and the loaded ones of its package, or, unless it is installed, of the folder of its file."""
     package, path = module.__name__.partition(".")[0], Path(inspect.getfile(module))
-    files = {it: Path(getattr(it, "__file__", None) or "") for it in list(sys.modules.values()) if inspect.ismodule(it)}
     found = {
-        it for it, file in files.items() if file.suffix == ".py" and (
-            it.__name__.partition(".")[0] == package
-            or (path.parent in file.parents and OWN not in file.parents and not _is_installed(path, file))
-        )
+        it for it, file in guests.loaded_sources().items() if it.__name__.partition(".")[0] == package
+        or (path.parent in file.parents and OWN not in file.parents and not guests.is_installed(path, file))
     }  # fmt: skip
     return sorted({module, *found}, key=lambda it: it.__name__)
-
-
-def _is_installed(*paths: Path) -> bool:
-    """Return whether any of some paths is of what is installed."""
-    return any(Path(folder) in path.parents for folder in INSTALLED for path in paths)
 
 
 @functools.cache
