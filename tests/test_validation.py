@@ -134,6 +134,32 @@ def test_mueller_matrices(method, fault):
     assert report.verdict("polarization") == ("fail" if fault else "pass"), report
 
 
+def like_two_polarizers(matrix, light, viewer):
+    matrix[0, 1] = matrix[1, 0] = 2 * matrix[0, 0]
+    return matrix
+
+
+def with_no_numbers(matrix, light, viewer):
+    matrix[0, 1] = np.nan
+    return matrix
+
+
+@pytest.mark.parametrize("fault", [None, like_two_polarizers, with_no_numbers])
+def test_mueller_matrices_of_a_delta_function_beside_a_lobe(fault):
+    def sample(own, ctx, si, *given):
+        bs, weight = own(ctx, si, *given)
+        if not (fault and mi.is_polarized):
+            return bs, weight
+        is_delta = bs.sampled_type == int(mi.BSDFFlags.DeltaReflection)
+        return bs, dr.select(is_delta, fault(mi.Spectrum(weight), -bs.wo, si.wi), weight)
+
+    for variant in ("llvm_ad_spectral_polarized", "llvm_ad_spectral", "llvm_ad_rgb"):
+        mi.set_variant(variant)
+        bsdf = wrapped("coated", {"type": "plastic"}, sample=sample)
+    report = check(bsdf, only="polarization")
+    assert report.verdict("polarization") == ("fail" if fault else "pass"), report
+
+
 VALUES = "eval", "eval_pdf", "sample"
 DIMMED = [
     *((bsdf, VALUES, 1) for bsdf in ("conductor", "plastic", "roughdielectric")),
@@ -358,6 +384,13 @@ FALSE_ALARMS = {
     "gradients of textures": case("textures", "bumpmap", arbitrary=texels(True), a={"type": "diffuse"}),
     "index above one as a colour": case("colours spectral", "low", variant="microfacet", int_ior=1.006),
     "a reflection that is drawn once in 40,000 samples": case("deltas", "dielectric", int_ior=1.01),
+    "glass that is dusty": case(
+        "mode",
+        "blendbsdf",
+        weight=0.3,
+        glass={"type": "dielectric"},
+        dust={"type": "twosided", "a": {"type": "diffuse"}},
+    ),
     "a faint one over a diffuse one": case("deltas", "plastic", specular_reflectance=2e-4),
     "tints": case("colours spectral", "burley", sheen=1.0, sheen_tint=1.0, spec_tint=1.0, base_color=0.5),
     "a lobe opposite to the normal": case("pdf chi2", "lafortune", 0, cz=-1.5, exponent=0.0, diffuse_reflectance=0.2),

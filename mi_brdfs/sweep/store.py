@@ -73,7 +73,7 @@ class Store:
 
     def rows(self, columns: Iterable[str] | None = None) -> Iterator[dict[str, Any]]:
         """Yield the rows of all files, one file at a time; warn of each that holds no such rows."""
-        for path in sorted(self.folder.glob("*.parquet")):
+        for path in sorted(self.folder.glob("[!.]*.parquet")):
             try:
                 if not path.is_file():  # opening a pipe would wait for ever
                     raise ValueError("it is no regular file")

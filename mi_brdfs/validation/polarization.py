@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -27,6 +28,7 @@ SEED = 105
 """Of samples."""
 BACK = np.array([1, 1, -1, 1])
 """The signs of the Stokes parameters for light that goes back along its way."""
+TURNED = "if its directions are turned about the normal"
 
 
 @of_whole
@@ -36,8 +38,7 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
-    Importance, for exchanged directions. Of delta functions alone, the weights of samples are looked at, and not
-    exchanged.
+    Importance, for exchanged directions. Of delta functions, the weights of samples are looked at, and not exchanged.
 
     The first elements of values, and of the weights of delta functions, are what the unpolarized variant has, if the
     BSDF works there, to float32's rounding; and by them, too, values are finite, weights are eval/pdf, as many samples
@@ -51,17 +52,19 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     # About the mirror direction, where most BSDFs that polarize have their light.
     near = wi * [-1, -1, 1] + 0.1 * beside(wi, 103)
     wo[::2] = (near / np.linalg.norm(near, axis=1, keepdims=True))[::2]
+    judged, others = list[Judged](), list[tuple[str, Array, Array, Array]]()
     with mi.variant_context(name), skipping(f"It does not work in {name}: "):
-        bsdf, mueller = load(described), _mueller if run.probe.parts else _weight
-        if not run.probe.parts:
-            wo = _directions(_sampled(bsdf, wi)[0], len(wi))
-        matrix = mueller(bsdf, wi, wo)
-        if not isinstance(matrix, mi.Spectrum):
-            raise Skipped("It returns no Mueller matrices.")
-        matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
-        exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
-        back = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
-        others = _others(run, bsdf, wi, wo, matrices, exchanged) if run.probe.parts else []
+        bsdf = load(described)
+        if run.probe.parts:
+            of_eval = _judged(bsdf, "eval's", _mueller, wi, wo)
+            exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
+            others = _others(run, bsdf, wi, wo, of_eval.matrices, exchanged)
+            if not part.has(mi.BSDFFlags.NonSymmetric):
+                of_eval.same["if its directions are exchanged"] = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
+            judged.append(of_eval)
+        if run.probe.deltas:
+            drawn = _directions(_sampled(bsdf, wi)[0], len(wi))
+            judged.append(_judged(bsdf, "a delta function's", partial(_weight, run.probe), wi, drawn))
         there = anywhere(run, BSDFProbe(bsdf))
         failed, lit = failures(there, AGAIN), there.samples(part, all_over(part)).lit.mean()
         passages = ((side, other) for side in part.sides for other in part.sides)
@@ -72,25 +75,8 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     if lit < 0.9 * (usual := run.samples(part, all_over(part)).lit.mean()):
         outcome.fault(f"in {name}, {lit:.1%} of the samples carry light, but {usual:.1%} in {mi.variant()}", np.inf)
     _check_intensity(run, outcome, name, bright, *pairs)
-    intensity = np.maximum(matrices[..., 0, 0], 1e-30)
-    states = np.random.default_rng(104).normal(size=(STATES, 3))
-    states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
-    made = matrices @ states.T
-    degree = ((np.linalg.norm(made[..., 1:, :], axis=-2) - made[..., 0, :]) / intensity[..., None]).max(axis=-1)
-    why = "some light would be polarized more than fully"
-    degree *= (degree > TOLERANCE) & (matrices[..., 0, 0] > 0)
-    outcome.wrong(degree, "the excess of eval's Mueller matrix", degree, why, wi, wo)
-    same = not int(run.probe.bsdf.flags()) & int(mi.BSDFFlags.Null)
-    same = same and bool(np.quantile(abs(turned - matrices)[..., 0, 0] / intensity, 0.99) < TOLERANCE)
-    for law, other, words in (
-        (bool(run.probe.parts) and not part.has(mi.BSDFFlags.NonSymmetric), back, "if its directions are exchanged"),
-        (same, turned, "if its directions are turned about the normal"),
-    ):
-        difference = abs(other - matrices).max(axis=(-2, -1)) / np.maximum(intensity, other[..., 0, 0])
-        # Those of grazing facets and of narrow lobes have few digits.
-        wrong = difference * (law and np.quantile(difference, 0.99) > TOLERANCE)
-        name = f"the change of eval's Mueller matrix {words}"
-        outcome.wrong(wrong, name, difference, "in parts of the intensity", wi, wo)
+    for each in judged:
+        _check_physical(outcome, each, wi)
     for name, towards, other, own in others:
         lit = other[:, 0, 0, 0] != 0
         difference = abs(_normalized(other) - _normalized(own)).max(axis=(-2, -1)) * lit[:, None]
@@ -98,6 +84,45 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
             name = f"the difference of the Mueller matrices of {name} and of eval"
             outcome.wrong(difference, name, difference, "in parts of their intensities", wi, towards, seed=SEED)
     return "Mueller matrices are physical."
+
+
+class Judged(NamedTuple):
+    """Mueller matrices without the cosine, shape (N, channels, 4, 4), for light from wo."""
+
+    whose: str
+    wo: Array
+    matrices: Array
+    same: dict[str, Array]
+    """Those that must be the same, by why."""
+
+
+def _judged(bsdf: Any, whose: str, mueller: Callable[..., Any], wi: Array, wo: Array) -> Judged:
+    matrix = mueller(bsdf, wi, wo)
+    if not isinstance(matrix, mi.Spectrum):
+        raise Skipped("It returns no Mueller matrices.")
+    matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
+    change = abs(turned - matrices)[..., 0, 0] / np.maximum(matrices[..., 0, 0], 1e-30)
+    goes_through = int(bsdf.flags()) & int(mi.BSDFFlags.Null)
+    same = {} if goes_through or np.quantile(change, 0.99) >= TOLERANCE else {TURNED: turned}
+    return Judged(whose, wo, matrices, same)
+
+
+def _check_physical(outcome: Outcome, judged: Judged, wi: Array) -> None:
+    """Check that matrices polarize light at most fully, and are what they must be the same as."""
+    matrices, intensity = judged.matrices, np.maximum(judged.matrices[..., 0, 0], 1e-30)
+    states = np.random.default_rng(104).normal(size=(STATES, 3))
+    states = np.concatenate([np.ones((STATES, 1)), states / np.linalg.norm(states, axis=1, keepdims=True)], axis=1)
+    made = matrices @ states.T
+    degree = ((np.linalg.norm(made[..., 1:, :], axis=-2) - made[..., 0, :]) / intensity[..., None]).max(axis=-1)
+    degree = np.where((matrices[..., 0, 0] > 0) & ~(degree <= TOLERANCE), degree, 0)
+    why = "some light would be polarized more than fully"
+    outcome.wrong(degree, f"the excess of {judged.whose} Mueller matrix", degree, why, wi, judged.wo)
+    for words, other in judged.same.items():
+        difference = abs(other - matrices).max(axis=(-2, -1)) / np.maximum(intensity, other[..., 0, 0])
+        # Those of grazing facets and of narrow lobes have few digits.
+        wrong = difference * (np.quantile(difference, 0.99) > TOLERANCE)
+        name = f"the change of {judged.whose} Mueller matrix {words}"
+        outcome.wrong(wrong, name, difference, "in parts of the intensity", wi, judged.wo)
 
 
 def _check_intensity(run: Run, outcome: Outcome, name: str, bright: list[Value], wi: Array, wo: Array) -> None:
@@ -149,9 +174,10 @@ def _mueller(bsdf: Any, wi: Array, wo: Array, context: Any = None) -> Any:
     return bsdf.eval(context or mi.BSDFContext(), interaction(wi), vectors(wo), True)
 
 
-def _weight(bsdf: Any, wi: Array, wo: Array) -> Any:
-    """Return that of a delta function's samples, which go to wo."""
-    return _sampled(bsdf, wi)[1]
+def _weight(probe: BSDFProbe, bsdf: Any, wi: Array, wo: Array) -> Any:
+    """Return that of the samples of delta functions, which go to wo."""
+    bs, weight = _sampled(bsdf, wi)
+    return dr.select(probe.is_smooth(bs), 0, weight)
 
 
 def _sampled(bsdf: Any, wi: Array) -> tuple[Any, Any]:
