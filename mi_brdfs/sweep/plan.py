@@ -186,6 +186,7 @@ def digest(data: Any) -> str:
 
 
 OWN = Path(__file__).parents[1]
+"""The folder of mi_brdfs."""
 
 
 def versions(model: type[Model] | None = None) -> str:
@@ -219,5 +220,6 @@ def _beside(module: Any) -> list[Any]:
 
 @functools.cache
 def _sources_of(folder: Path) -> str:
+    """Return the digest of the files in a folder when they were first asked for: those that are loaded."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     return digest([(str(path.relative_to(folder)), content_hash(path)) for path in files])
