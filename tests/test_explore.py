@@ -440,6 +440,27 @@ def test_what_is_copied_names_a_file_of_any_name(llvm_rgb, tmp_path, monkeypatch
     assert printed.split(b"\0")[:-1] == words
 
 
+def test_what_is_copied_of_a_material_of_a_file_has_its_edits(llvm_rgb, tmp_path):
+    """Or says that it has not, of one that is made of others or has textures."""
+    metal = '<bsdf type="walter"><float name="alpha" value="0.2"/><rgb name="f0" value="0.9, 0.6, 0.2"/></bsdf>'
+    for inner, alpha in ((metal, "alpha"), (f'<bsdf type="twosided">{metal}</bsdf>', "brdf_0.alpha")):
+        path = tmp_path / "metal.xml"
+        path.write_text(inner.replace("<bsdf", '<bsdf version="3.0.0"', 1))
+        (source,) = find_sources(str(path))
+        subject, materials = {"type": "given", "file": source.word}, Materials({source.word: source})
+        as_it_is, edited = materials.written(checked(subject)), materials.written(checked(subject | {alpha: 0.77}))
+        assert as_it_is["command"] == f"mi-brdfs show {path}" and as_it_is["dict"] == f"# {path}"
+        if "." in alpha:
+            assert edited["command"].endswith("metal.xml  # but with brdf_0.alpha = 0.77")
+            assert all(edited[it].count("metal.xml, but with brdf_0.alpha = 0.77") == 1 for it in ("xml", "dict"))
+            continue
+        copied = eval(edited["dict"])
+        assert copied["alpha"] == pytest.approx(0.77) and copied["f0"]["value"] == pytest.approx([0.9, 0.6, 0.2])
+        assert "mi-brdfs show walter" in edited["command"] and "-D alpha=0.77" in edited["command"]
+        loaded = mi.load_string(edited["xml"].replace(">", ' version="3.0.0">', 1))
+        assert mi.traverse(loaded)["alpha.value"][0] == pytest.approx(0.77)
+
+
 def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     models = ["lambert", "ward"]
     monkeypatch.setattr("mi_brdfs.explorer.session.find_models", lambda names: [find_model(it) for it in models])

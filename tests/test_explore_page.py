@@ -281,7 +281,7 @@ def test_a_signal_ends_it_and_leaves_nothing(tmp_path, monkeypatch, sent):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     process, address = serving("lambert")
     uploaded(address, "x.bsdf", LOFT.read_bytes())
-    assert len(list(tmp_path.glob("*/1.bsdf"))) == 1
+    assert len(list(tmp_path.glob("*/upload-1.bsdf"))) == 1
     process.send_signal(sent)
     assert process.wait(20) == 128 + sent and not list(tmp_path.iterdir())
 

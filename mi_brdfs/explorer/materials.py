@@ -152,7 +152,12 @@ class Materials:
         values = properties({name: value for name, value in bsdf.items() if name not in ("type", "file")})
         if kind == GIVEN:
             word = self.source(bsdf).word
-            return {**_remark(word), "command": _command(word)}
+            if not values:
+                return {**_remark(word), "command": _command(word)}
+            if not (plain := self._plain(bsdf)):
+                changed = ", ".join(f"{name} = {text_of(value)}" for name, value in values.items())
+                return {**_remark(f"{word}, but with {changed}"), "command": f"{_command(word)}  # but with {changed}"}
+            kind, values = plain.pop("type"), plain
         word, named = kind, {"type": kind, **values}
         if kind == MEASURED:
             word = self.source(bsdf).path
@@ -164,6 +169,14 @@ class Materials:
         except ValueError as error:
             told = _remark(str(error))
         return {**told, "command": _command(word, *options)}
+
+    def _plain(self, bsdf: Bsdf) -> dict[str, Any]:
+        """Return a dict of plain values for a material of a file; none if it is of no model or has other textures."""
+        from ..fit.pictures import plugin_dict
+
+        with self.loaded(bsdf) as loaded:
+            found = plugin_dict(loaded) if hasattr(loaded, "model") else {}
+        return {} if any(isinstance(it, mi.Texture) for it in found.values()) else found
 
 
 def kinds() -> list[dict[str, str]]:

@@ -194,11 +194,12 @@ def _found(rendered: Rendered, point: Array, sigma: Array, losses: Sequence[floa
         sigmas[slot.key] = deviations[0] if single else deviations
         bounds += [slot.key if single else f"{slot.key}.{channel}" for number, channel in zip(own, "rgb", strict=False)
                    if slot.unknown.at_end(float(number))]  # fmt: skip
-    bsdfs = {path: _plugin_dict(bsdf) for key, bsdf, path, _ in declared(rendered.params) if key in values}
+    bsdfs = {path: plugin_dict(bsdf) for key, bsdf, path, _ in declared(rendered.params) if key in values}
     return ImageFit(values, sigmas, bsdfs, bounds, list(losses), converged)
 
 
-def _plugin_dict(bsdf: Any) -> dict[str, Any]:
+def plugin_dict(bsdf: Any) -> dict[str, Any]:
+    """Return the dict of a loaded BSDF of a model, with its textures unless they are a number or a colour."""
     model = bsdf.model
     words = dict(model.parameters.chosen)
     for parameter in model.parameters.values():

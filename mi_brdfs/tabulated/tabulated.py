@@ -42,8 +42,8 @@ class Tabulated(Model):
     and difference angles, of means of the nearest samples with positive weights.
 
     The energy is the file's: nothing keeps a measurement from reflecting more than it receives. Reciprocal where the
-    format is (MERL with half a turn of φd), else as good as the measurement. One-sided.
-    Depolarises.
+    format is (MERL with half a turn of φd), and of scattered samples, which count for both orders of their directions;
+    else as good as the measurement. One-sided. Depolarises.
 
     A file that several BSDFs name is in memory once. With ``differentiable`` a BSDF has its own copy, and
     ``mitsuba.traverse`` shows it as ``values``: a tensor with the file's axes, and the channels last, in [0, ∞) unless
