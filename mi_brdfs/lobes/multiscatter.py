@@ -135,8 +135,8 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     way, smith = model.parameters.chosen.get("multiscatter", "none"), lobe.shadowing
     if way == "none" or not isinstance(smith, Smith):
         return (lobe,)
-    if way == "walk":
-        smith.correlated = True  # as the walk's first reflection is
+    if way == "walk" and smith.facets == "ggx":
+        smith.correlated = True  # as the walk's first reflection is; for others it hardly matters
     if not model.captured:
         model.captured += [table(smith), model.uniform.kept]
 

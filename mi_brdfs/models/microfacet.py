@@ -88,7 +88,7 @@ class Microfacet(Model):
       tabulated means F₁ and F₂ at the ends of a path and between them, of F or the nearest to it of Schlick's with an
       f82, and probabilities p and q that light escapes at its second reflection and at each later one; F̄₁ is the mean
       of F₁ over directions, and p = p(wi) + p(wo) - p̄, so that f is reciprocal. The walk's first reflection has the
-      height-correlated term, and so has f, also with smith
+      height-correlated term, and so has f for ggx, also with smith; for the others it hardly matters
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
 
