@@ -168,7 +168,7 @@ def test_own_models_are_known_by_their_version_where_they_are_installed_and_else
         (plan.OWN / "lobe.py").write_text(folder)
         found.append(plan.versions(ward))
     assert len({*found}) == 2 and all(it.startswith(f"{version}, sources ") for it in found)
-    monkeypatch.setattr(guests, "INSTALLED", [tmp_path])
+    monkeypatch.setattr("site.getsitepackages", lambda: [str(tmp_path)])
     assert plan.versions(ward) == version
 
 

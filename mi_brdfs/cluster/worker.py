@@ -34,8 +34,8 @@ class Setup(NamedTuple):
     guests: dict[str, str | None]
     """The sources of others' models (:func:`mi_brdfs.mitsuba.guests.sources`), with the text of files."""
     versions: dict[str, str]
-    sources: dict[str, str]
-    """The digests of modules that are not installed, and so may change while they have the same version."""
+    digests: dict[str, str]
+    """Those of modules that are not installed, and so may change while they have the same version."""
 
 
 _current: Setup | None = None
@@ -56,10 +56,10 @@ def setup(threads: int | None) -> Setup:
     files = {
         each: Path(each).read_text(encoding="utf-8") if each.endswith(".py") else None for each in guests.sources()
     }
-    return Setup(mi.variant(), threads, files, versions(), {it.__name__: text for it, text in sources().items()})
+    return Setup(mi.variant(), threads, files, versions(), {it.__name__: digest for it, digest in digests().items()})
 
 
-def sources() -> dict[ModuleType, str]:
+def digests() -> dict[ModuleType, str]:
     """Return the digests of the files of all loaded modules that are not installed, but for the script that runs."""
     found = {}
     for module, file in guests.loaded_sources().items():
@@ -102,9 +102,9 @@ def _prepare(wanted: Setup) -> None:
         mi.set_variant(wanted.variant)
     for source, text in wanted.guests.items():
         guests.import_models(source if text is None else _file(source, text))
-    for module, digest in sources().items():
+    for module, digest in digests().items():
         loaded = _loaded.setdefault(module, digest)
-        if wanted.sources.get(module.__name__, loaded) != loaded:
+        if wanted.digests.get(module.__name__, loaded) != loaded:
             told = f"has loaded another {module.__name__} than this process: restart it, with the same files"
             raise RuntimeError(f"The worker at {get_worker().address} {told}.")
     if wanted.threads is not None:

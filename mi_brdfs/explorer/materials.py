@@ -154,10 +154,10 @@ class Materials:
             word = self.source(bsdf).word
             if not values:
                 return {**_remark(word), "command": _command(word)}
-            if not (plain := self._plain(bsdf)):
+            if not (edited := self._edited(bsdf)):
                 changed = ", ".join(f"{name} = {text_of(value)}" for name, value in values.items())
                 return {**_remark(f"{word}, but with {changed}"), "command": f"{_command(word)}  # but with {changed}"}
-            kind, values = plain.pop("type"), plain
+            kind, values = edited.pop("type"), edited
         word, named = kind, {"type": kind, **values}
         if kind == MEASURED:
             word = self.source(bsdf).path
@@ -170,7 +170,7 @@ class Materials:
             told = _remark(str(error))
         return {**told, "command": _command(word, *options)}
 
-    def _plain(self, bsdf: Bsdf) -> dict[str, Any]:
+    def _edited(self, bsdf: Bsdf) -> dict[str, Any]:
         """Return a dict of plain values for a material of a file; none if it is of no model or has other textures."""
         from ..fit.pictures import plugin_dict
 

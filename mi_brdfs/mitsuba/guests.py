@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import importlib.util
+import os
 import site
 import sys
-import sysconfig
 import traceback
 import warnings
 from contextlib import suppress
@@ -25,8 +25,6 @@ from .registry import all_models, brought_terms, is_own, models_in, register, te
 
 ENTRY_POINTS = "mi_brdfs.models"
 """The entry-point group for models of installed packages."""
-INSTALLED = sysconfig.get_path("stdlib"), *site.getsitepackages(), site.getusersitepackages()
-"""The folders of what is installed."""
 _files: dict[str, str] = {}
 """The files imported by path, by module name."""
 _of_bsdfs: list[str] = []
@@ -120,7 +118,8 @@ def loaded_sources() -> dict[ModuleType, Path]:
 
 def is_installed(*paths: Path) -> bool:
     """Return whether any of some paths is of what is installed, and so has a version."""
-    return any(Path(folder) in path.parents for folder in INSTALLED for path in paths)
+    folders = Path(os.__file__).parent, *map(Path, [*site.getsitepackages(), site.getusersitepackages()])
+    return any(folder in path.parents for folder in folders for path in paths)
 
 
 def _of_file(path: Path) -> ModuleType:

@@ -28,7 +28,6 @@ SEED = 105
 """Of samples."""
 BACK = np.array([1, 1, -1, 1])
 """The signs of the Stokes parameters for light that goes back along its way."""
-TURNED = "if its directions are turned about the normal"
 
 
 @of_whole
@@ -97,13 +96,18 @@ class Judged(NamedTuple):
 
 
 def _judged(bsdf: Any, whose: str, mueller: Callable[..., Any], wi: Array, wo: Array) -> Judged:
+    """Return matrices, with those of turned directions if they must be the same."""
     matrix = mueller(bsdf, wi, wo)
     if not isinstance(matrix, mi.Spectrum):
         raise Skipped("It returns no Mueller matrices.")
     matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
     change = abs(turned - matrices)[..., 0, 0] / np.maximum(matrices[..., 0, 0], 1e-30)
     goes_through = int(bsdf.flags()) & int(mi.BSDFFlags.Null)
-    same = {} if goes_through or np.quantile(change, 0.99) >= TOLERANCE else {TURNED: turned}
+    same = (
+        {}
+        if goes_through or np.quantile(change, 0.99) >= TOLERANCE
+        else {"if its directions are turned about the normal": turned}
+    )
     return Judged(whose, wo, matrices, same)
 
 
