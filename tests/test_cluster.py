@@ -176,6 +176,17 @@ def test_a_picture_of_workers_is_that_of_one_thread_in_every_bit(tmp_path, addre
         assert np.array(picture.image).std() > 0.05
 
 
+def test_lights_are_in_the_same_order_whenever_a_scene_is_loaded(tmp_path):
+    """Or the same random number would choose another one in another process. Mitsuba orders shapes that it merges by
+    where they are in memory."""
+    place = '<transform name="to_world"><translate x="{}"/></transform>'
+    light = f'<shape type="rectangle">{place}<emitter type="area"/></shape>'
+    (tmp_path / "scene.xml").write_text(f'<scene version="3.0.0">{"".join(map(light.format, range(9)))}</scene>')
+    for _ in range(5):
+        scene = SceneFile(str(tmp_path / "scene.xml")).load()
+        assert [round(shape.bbox().center().x) for shape in scene.shapes()] == [*range(9)]
+
+
 def test_one_thread_puts_the_sums_of_workers_together(tmp_path):
     """A film's reconstruction filter adds to pixels of others; the film is large enough for several threads."""
     path = scene_in(tmp_path, "shading")

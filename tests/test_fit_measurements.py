@@ -251,6 +251,11 @@ def test_tells_what_the_data_do_not_determine():
     given = {"metallic": 0.0, "sheen": 0.0, "specular": 0.5, "clearcoat": None, "clearcoat_gloss": None}
     (it,) = fit(measured("lambert", {"reflectance": 0.4}, 300), "burley", given=given, starts=2)
     assert "sheen_tint" in it.undetermined
+    del given["sheen"]
+    for seed in (0, 4):  # which end near to no sheen, and at it
+        wi, wo, f = measured("lambert", {"reflectance": 0.4}, 300, seed, noise=0.02)
+        (it,) = fit((wi, wo, f[:, None] * np.array([1, 0.7, 0.3])), "burley", given=given, starts=2)
+        assert it.bsdf["sheen"] < 1e-4 and it.sigma["sheen_tint"] is None and "sheen_tint" in it.undetermined
     json.dumps(it.to_dict(), allow_nan=False)
 
 
@@ -314,7 +319,9 @@ def test_runs_without_a_variant_for_it(ward):
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
         ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),
         ("good", "kurt", {"lobes": 9}, "There can be 8 lobes at most, not 9."),
+        ("good", "ward", {"given": {"alpha": (0.1, 0.2)}}, "could not assign an object of type 'tuple' to key 'alpha'"),
         ("good", "ward", {"starts": 0}, "There is nothing to start from"),
+        ("good", "ward", {"seed": -1}, "A fit needs starts >= 0, lobes >= 1, pairs >= 2, seed >= 0 and a cut in (0"),
         ("shapes", "ward", {}, "Arrays (wi, wo, f) have the shapes (N, 3), (N, 3) and (N,), or (N, 3) of"),
         ("short", "ward", {}, "Arrays (wi, wo, f): directions must have the length 1, not 0.5."),
         ("nothing", "ward", {}, "There are no data to fit."),

@@ -114,6 +114,8 @@ HEAVY = [  # of earlier samplers a sample weighed up to 300 times the mean
     (85.9, -92.2, None, kit("beckmann", "implicit", alpha_u=1.856, alpha_v=0.1317, int_ior=2.958, ext_ior=4.477)),
     (36.4, -100.8, None, kit("beckmann", "ashikhmin-shirley", alpha_u=1.912, alpha_v=0.00059, int_ior=3.588,
                              ext_ior=9.557)),
+    (88.0, 0.0, None, kit("ggx", "smith", alpha=0.3, f0=0.0, multiscatter="walk")),
+    (81.5, 0.0, None, kit("ggx", "smith", alpha=0.1, f0=0.9, f82=0.0, multiscatter="kulla-conty")),
 ]  # fmt: skip
 
 

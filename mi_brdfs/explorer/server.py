@@ -253,7 +253,8 @@ def listening(host: str, port: int | None) -> socket.socket:
             problem = error
     if problem.errno == errno.EADDRINUSE:
         raise ValueError(f"port {port} is in use; choose another one, or none")
-    raise ValueError(f"{host} port {port}: {problem.strerror or problem}")
+    place = host if port is None else f"{host} port {port}"
+    raise ValueError(f"{place}: {problem.strerror or problem}")
 
 
 def _logger() -> logging.Logger:

@@ -57,7 +57,7 @@ def packed(payload: bytes, **header: Any) -> bytes:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
-        return [float(f"{it:.5g}") if np.isfinite(it) else None for it in value.ravel().tolist()]
+        return [float(f"{it:.6g}") if np.isfinite(it) else None for it in value.ravel().tolist()]
     return value.item()
 
 

@@ -105,8 +105,8 @@ def fit(
     sources: list[Any] = list(data) if several else [data]  # type: ignore[arg-type]
     if not sources:
         raise FitError("There are no data to fit.")
-    if starts < 0 or lobes < 1 or pairs < 2 or not 0 < cut <= 90:
-        raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2 and a cut in (0, 90] degrees.")
+    if starts < 0 or lobes < 1 or pairs < 2 or seed < 0 or not 0 < cut <= 90:
+        raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2, seed >= 0 and a cut in (0, 90] degrees.")
     models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
     if not models:
         raise FitError("There is no model to fit; name one or more.")

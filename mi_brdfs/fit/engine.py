@@ -38,15 +38,15 @@ def fit_configuration(
     owners, points, warm = starts(problem, count, given, seed)
     low, high = problem.box
     points, costs = solve(lambda which, at: problem.sums(owners[which], at), points, low, high, advance)
-    values = problem.values_of(points)
     best = [int(np.flatnonzero(owners == m)[costs[owners == m].argmin()]) for m in range(len(materials))]
-    errors = problem.errors(range(len(materials)), values[best])
-    spread = [
-        _uncertainty(problem, values[best[m]], *sums) for m, *sums in problem.residuals(range(len(best)), values[best])
-    ]
+    # At the end of its range a number may take the influence of another one: near to it this has some.
+    found = np.array([configuration.shown(x) for x in problem.values_of(points[best])])
+    every = range(len(materials))
+    errors = problem.errors(every, found)
+    spread = [_uncertainty(problem, found[m], *sums) for m, *sums in problem.residuals(every, found)]
     fits = []
     for m, material in enumerate(materials):
-        x, own = values[best[m]], costs[owners == m]
+        x, own = found[m], costs[owners == m]
         residuals = int(material.usable[: material.fitted].sum())
         fits.append(Fit(
             **{it.name: getattr(material, it.name) for it in fields(Data)},
@@ -95,6 +95,7 @@ def _uncertainty(problem: Problem, values: Array, residuals: Array, jacobian: Ar
     covariance = bread @ (scores.T @ scores + variance * before) @ bread / np.outer(scale, scale)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0))
     ratio = covariance / np.maximum(np.outer(deviations, deviations), 1e-300)
+    lost |= deviations > ranges
     lost |= np.count_nonzero(jacobian.any(axis=1)) <= len(unknowns)  # through so few values goes any model
     known = [k for k in range(len(unknowns)) if not ended[k] and not lost[k]]
     rows = {labels[k]: {labels[j]: float(np.clip(ratio[k, j], -1, 1)) for j in known} for k in known}

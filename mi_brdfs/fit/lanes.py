@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba import llvm
+from ..mitsuba.errors import one_line
 from ..mitsuba.fastest import fastest
 from ..probe.arrays import Array, context, floats, held, interaction, numbers, per_lane, vectors
 from ..probe.directions import hemisphere
@@ -51,9 +52,7 @@ class Lanes:
             self.bsdf = mi.load_dict({"type": configuration.plugin, **configuration.given, **self.textures})
         except RuntimeError as error:
             _, refused, sentence = str(error).rpartition("ParameterError: ")
-            if not refused:
-                raise
-            raise FitError(sentence.strip()) from None
+            raise FitError(sentence.strip() if refused else one_line(error)) from None
 
     def batches(self, pairs: Sequence[tuple[Array, Array]]) -> Iterator[range]:
         """Yield ranges of settings that fit into a kernel together."""

@@ -62,7 +62,8 @@ class Fit(Data):
     correlations: dict[str, dict[str, float]]
     """Of the fitted numbers: "alpha", "diffuse_reflectance.r" …"""
     undetermined: list[str]
-    """Numbers that can change together without a change of the values, or all, if no more values were fitted."""
+    """Numbers that can change together without a change of the values, or whose standard deviation is larger than their
+    range, or all, if no more values were fitted."""
     bounds: list[str]
     """Numbers that ended at an end of their range."""
     starts: Starts

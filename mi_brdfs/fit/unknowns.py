@@ -162,11 +162,15 @@ class Configuration:
     def is_colour(self, name: str) -> bool:
         return self.unknowns[self.indices(name)[0]].quantity.colour
 
+    def shown(self, x: Array) -> list[float]:
+        """Return values of the unknowns as the plugin dict has them."""
+        return [float(f"{unknown.shown(float(value)):.7g}") for unknown, value in zip(self.unknowns, x, strict=True)]
+
     def bsdf(self, x: Array) -> dict[str, Any]:
         """Return the plugin dict for values of the unknowns."""
-        values: dict[str, Any] = {}
+        values, shown = dict[str, Any](), self.shown(x)
         for name in self.names:
-            numbers = [float(f"{self.unknowns[k].shown(float(x[k])):.7g}") for k in self.indices(name)]
+            numbers = [shown[k] for k in self.indices(name)]
             values[name] = numbers[0] if len(numbers) == 1 else {"type": "rgb", "value": numbers}
         return {"type": self.plugin, **self.given, **values}
 

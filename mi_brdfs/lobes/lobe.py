@@ -36,10 +36,6 @@ class Lobe:
         be exact, but it must be positive wherever the lobe reflects anything."""
         raise NotImplementedError(f"{type(self).__name__} does not define estimated_albedo.")
 
-    def energy(self, wi: mi.Vector3f) -> mi.Float:
-        """Return the luminance of that, or what is about it, for the choice among lobes."""
-        return luminance(self.estimated_albedo(wi))
-
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         """Return ``(value, pdf)``: f |cosθ_o|, and the density with which :meth:`sample` draws ``wo``."""
         raise NotImplementedError(f"{type(self).__name__} does not define eval_pdf.")
@@ -147,7 +143,7 @@ class Mixture:
         counts = [1.0] * len(lobes)
         if mirrored is not None:
             counts = [select(mirrored, 1.0, 0.0) if it.transmits else select(mirrored, 0.0, 1.0) for it in lobes]
-        energies = [count * lobe.energy(wi) for count, lobe in zip(counts, lobes, strict=True)]
+        energies = [count * luminance(lobe.estimated_albedo(wi)) for count, lobe in zip(counts, lobes, strict=True)]
         total = sum(energies)
         black = total < SMALL
         scale = dr.rcp(dr.select(black, sum(counts), total))

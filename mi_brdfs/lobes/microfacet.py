@@ -5,8 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, luminance, safe_sqrt
-from ..microfacet.escape import Walks
+from ..math import EPSILON, Spectrum, safe_sqrt
 from ..microfacet.facet import Cosines, Facet
 from ..microfacet.sampling import MixedProposals
 from ..microfacet.shadowing import Shadowing
@@ -32,9 +31,6 @@ class MicrofacetLobe(Lobe):
     """for a long tail under an energy-conserving shadowing term,"""
     NEARER_UPRIGHT = 0.08
     """and for a shadowing term that does not lean."""
-
-    walks: Walks | None = None
-    """What becomes of light that facets reflect again, if it counts (:mod:`.multiscatter`)."""
 
     def __init__(
         self, colour: Spectrum, distribution: Distribution, shadowing: Shadowing, fresnel: Fresnel, scale: mi.Float = 1
@@ -75,12 +71,6 @@ class MicrofacetLobe(Lobe):
         if (forward := self.fresnel.forward(self.distribution, wi)) is not None:
             fresnel += forward.reflectance
         return self.reflectance * (fresnel * seen)
-
-    def energy(self, wi: mi.Vector3f) -> mi.Float:
-        if self.walks is None:
-            return super().energy(wi)
-        fresnel = self.fresnel.brightness(dr.minimum(wi.z, 0.9))
-        return luminance(self.reflectance) * (fresnel * (1 - self.walks.of(wi).lost))
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         facet = Facet.between(wi, wo)

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, luminance, safe_sqrt
+from ..math import EPSILON, Spectrum, safe_sqrt
 from ..microfacet.escape import Escape, MeanEscape, Walks, table
 from ..microfacet.shadowing import Smith
 from ..microfacet.terms import Fresnel
@@ -34,8 +34,7 @@ class MultipleScattering(Lobe):
         self.colours = uniform("colours", self.between(lobe.reflectance))
         lost = dr.maximum(self.mean.lost, EPSILON)
         b = self.GRAZING * lost * dr.sqrt(lost)
-        kept = b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost, luminance(self.colour(self.mean, self.mean))
-        self.b, self.norm, self.scale, self.typical = uniform("lobe", kept)
+        self.b, self.norm, self.scale = uniform("lobe", (b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost))
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         """Return what of the colour is the same for all directions."""
@@ -48,9 +47,6 @@ class MultipleScattering(Lobe):
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         i = self.walks.of(wi)
         return self.colour(i, self.mean) * i.lost
-
-    def energy(self, wi: mi.Vector3f) -> mi.Float:
-        return self.typical * self.walks.of(wi).lost
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return 0  # as mirrors, facets lose nothing
@@ -143,7 +139,7 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     def uniform(name: str, values: Any) -> Any:
         return model.uniform(f"{name} {index}", values)
 
-    lobe.walks = walks = Walks(smith, model.captured[0], uniform)
+    walks = Walks(smith, model.captured[0], uniform)
     if way == "turquin":
         return (turquin(lobe, walks),)
     return lobe, (WalkLobe if way == "walk" else KullaContyLobe)(lobe, walks, uniform)

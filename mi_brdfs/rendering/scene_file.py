@@ -37,7 +37,7 @@ class SceneFile:
     replaced: dict[str, BSDFSource] = field(default_factory=dict)
     """What takes the place of BSDFs, or of those of shapes, by their ids."""
     keeps_ids: bool = False
-    """Whether BSDFs that are alike, and meshes with the same BSDF, stay apart though nothing is replaced."""
+    """Whether BSDFs that are alike stay apart though nothing is replaced."""
     contents: dict[str, bytes] | None = None
     """In a copy, the files by their paths, without the root."""
     names: dict[str, str] = field(default_factory=dict)

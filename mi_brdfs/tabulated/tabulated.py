@@ -30,11 +30,12 @@ class Tabulated(Model):
 
     ``trilinear`` interpolates linearly between the neighbouring nodes of the file's own grid: half and difference
     angles for MERL, angles about the mirror direction for goniometers, adaptive coordinates for RGL; four-dimensional
-    where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values and
-    missing ones count as 0, except for the channels of RGL's colours outside sRGB. What lies outside the measured range
-    has the value at its border with ``hold``, and is 0 with ``zero``. What a file calls the incident direction is wi,
-    as in Mitsuba's ``measured``. Files of f cosθ_o are divided by the cosine; ``quantity`` is for those that do not
-    state what they hold: ALTA's without #PARAM_OUT must be told, others are ``f`` by default.
+    where the file is anisotropic. ``nearest`` takes the nearest node's value: MERL's own look-up. Negative values count
+    as 0, except for the channels of RGL's colours outside sRGB, and so do missing ones; but ``trilinear`` puts the mean
+    of the neighbours that were measured in their place, where there are such. What lies outside the measured range has
+    the value at its border with ``hold``, and is 0 with ``zero``. What a file calls the incident direction is wi, as in
+    Mitsuba's ``measured``. Files of f cosθ_o are divided by the cosine; ``quantity`` is for those that do not state
+    what they hold: ALTA's without #PARAM_OUT must be told, others are ``f`` by default.
 
     Linear sRGB values are rgb. In spectral variants they weigh three spectra that sum to 1, so that white stays white.
     Values at several wavelengths are interpolated between them in spectral variants; rgb variants show them under
