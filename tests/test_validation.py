@@ -404,6 +404,16 @@ FALSE_ALARMS = {
         "flags", "cooktorrance", int_ior="water", ext_ior="water", distribution="blinn", film_thickness=0.0
     ),
     "facets smoother than those of a page": case("gradients", "burley", roughness=0.014, anisotropic=0.5),
+    "bright facets whose width has no influence": case(
+        "gradients",
+        "low",
+        a=9479.267547218811,
+        b=1e6,
+        c=0.0,
+        int_ior=44.895,
+        variant="microfacet",
+        normalization="unit",
+    ),
     "two lobes, both black": case(
         "components", "microfacet", diffuse_reflectance=0.0, int_ior="water", ext_ior="water"
     ),
