@@ -178,6 +178,11 @@ def test_tied_and_several_lobes():
     assert tied.bsdf["exponent_2"] == tied.bsdf["exponent_1"]
 
 
+def test_what_a_start_leaves_out_starts_where_it_suits_the_data(ward):
+    (it,) = fit(ward, "ward", start={"type": "ward"}, starts=0)
+    assert it.starts.tried == 1 and it.bsdf["alpha"] == pytest.approx(WARD["alpha"], rel=0.05)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "start",

@@ -302,6 +302,25 @@ def test_the_back_is_looked_at(named):
     assert failed == {None: [], "updates": ["textures", "updates"]}.get(named, [named]), report
 
 
+def test_samples_that_are_known_without_a_kernel_compile_none():
+    """Those of a mirror that sends all light back."""
+
+    def begin(self, props):
+        self.colour = props.get_texture("colour", 0.5)
+
+    def sample(self, ctx, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo, bs.pdf, bs.eta, bs.sampled_type = si.wi, 1, 1, int(mi.BSDFFlags.DeltaReflection)
+        return bs, self.colour.eval(si)
+
+    def traverse(self, callback):
+        callback.put("colour", self.colour, mi.ParamFlags.Differentiable)
+
+    kind = mi.BSDFFlags.DeltaReflection | BOTH_SIDES
+    back = stranger("sends_back", kind, begin=begin, sample=sample, traverse=traverse)
+    assert check(back, only="recompiles").passed
+
+
 @pytest.mark.slow
 def test_a_dict_is_checked_where_no_variant_is_active():
     code = "import mi_brdfs; print(mi_brdfs.validation.check({'type': 'lambert'}, only=['weight']).passed)"

@@ -84,7 +84,8 @@ def fit(
             otherwise; words of choices, a tuple for a fit of each.
             They hold for the models that have them.
         tied: parameters that equal another one, as ``{"cy": "cx"}``.
-        start: a plugin dict to start from, besides others, or several. No fit is worse than any of them.
+        start: a plugin dict to start from, besides others, or several. What it leaves out starts where it suits the
+            data. No fit is worse than one that gives all that is free.
         lobes: the number of lobes of models that have several of a kind.
         starts: the number of the other starts, of which no more than 256 are tried.
         seed: of the choice of pairs and of the random starts.
@@ -127,7 +128,7 @@ def fit(
             if fixed := sorted({name for it in alikes for name in it.fixed} & each_start.keys()):
                 named = listed(fixed, "and")
                 raise FitError(f"No fit can start at {each_start}: isotropic data fix {named}; leave it out.")
-            if not any(warm(configuration, each_start) for configuration, _ in todo):
+            if all(warm(configuration, each_start) is None for configuration, _ in todo):
                 raise FitError(f"No fit can start at {each_start}: it is of another plugin, or has other parameters.")
         ended, ranked = 0, []
         total = sum(len(alike) for _, alike in todo) * (starts + len(given_starts))

@@ -105,7 +105,7 @@ def starts(problem: Problem, count: int, given: list[Mapping[str, Any]], seed: i
     configuration = problem.configuration
     unknowns = len(configuration.unknowns)
     known = published(configuration)
-    own = [values for values in (warm(configuration, each) for each in given) if values]
+    own = [values for values in (warm(configuration, each) for each in given) if values is not None]
     owners, points = [], []
     for m, material in enumerate(problem.materials):
         rng = np.random.default_rng(seed)  # the same with other materials beside

@@ -313,7 +313,7 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
     # Where another limit holds, the parameter has no influence.
     if (near[0] == at_limit).all():
         return
-    # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump. Where
+    # Towards the limit it may vanish, as at an index of refraction of 1, or grow, as where an edge becomes a jump. If
     # only rounding tells values apart, it is rounding of their sum.
     inside, last = (abs(found).sum() for _, (found,) in (near, nearer))
     if max(0.3 * inside, 1e-6 * max(len(pairs.wi), abs(value).sum())) < last < 3 * inside:

@@ -58,7 +58,7 @@ def pdf(run: Run, part: Part, outcome: Outcome) -> str:
             share = "all" if trial.share == 1 else f"{100 * trial.share:.2f} % of the"
             told = f"pdf integrates to {trial.integral:.4g}, but {share} samples are drawn"
             outcome.fault(f"for light from {name} {told}", excess, wi=trial.incident.wi, seed=trial.seed)
-    factors = [trial.integral / max(trial.share, 1e-30) for trial in own]
+    factors = [trial.integral / trial.share if trial.share else np.inf for trial in own]
     outcome.tried = len(own)
     outcome.remark = _constant(factors) if len(outcome.faults) == len(own) > 1 else ""
     return f"Its integral agrees with the samples drawn to {largest:.1g}."

@@ -154,8 +154,6 @@ def recompiles(run: Run) -> Findings:
             outcome = Outcome("recompiles", each.key)
             with each.restored() as original:
                 first, *later = [launched(each, original * (0.97 - 0.01 * step) + 1e-4) for step in range(4)]
-            if not first:
-                outcome.fault("no kernel was launched at all")
             if fresh := set.union(*later) - first:
                 outcome.fault(f"{len(fresh)} kernels are compiled for three new values")
             yield outcome.finding("No kernel is compiled for a new value.")
