@@ -386,6 +386,12 @@ def test_channels_and_components(client):
     whole = of(client.show(bsdf, views=["polar"]), "polar")[0]["curves"][0]["y"]
     parts = [of(client.show(bsdf, views=["polar"], component=k), "polar")[0]["curves"][0] for k in (0, 1)]
     assert max(max(it["y"]) for it in parts) < max(whole)
+    diffuse, glossy, both = (
+        np.array(of(client.show(bsdf, views=["albedo"], component=k), "albedo")[0]["curves"][0]["y"])
+        for k in (0, 1, None)
+    )
+    assert np.ptp(diffuse) < 1e-3 and np.ptp(glossy) > 0.01
+    np.testing.assert_allclose(diffuse + glossy, both, atol=0.01)  # by 2048 samples
 
 
 def test_chi_square_on_request(client):

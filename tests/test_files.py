@@ -115,6 +115,7 @@ def test_a_full_disk_behind_the_standard_output_gets_a_sentence(tmp_path):
             assert ended(*words, stdout=full) == (1, told)
     assert target.is_file()
     assert "mi-brdfs: cannot write /dev/full: No space" in invoke("plot", "ward", "-o", "/dev/full").stderr
+    assert "-o /dev/full: write a .exr, .png, .jpg or" in invoke("show", "ward", "-o", "/dev/full").stderr
 
 
 def test_files_are_written_also_if_nobody_reads_on(tmp_path):

@@ -16,6 +16,7 @@ import mitsuba as mi
 import typer
 from rich.progress import TextColumn
 
+from ..parameters.messages import listed
 from .files import check_output
 from .options import file_option, writing_to
 from .terminal import Exit, err, fail, failing, out, progress, stdout_to_stderr
@@ -40,6 +41,8 @@ Denoise = Annotated[
 
 def output_files(output: Path) -> tuple[Path, Path]:
     """Return the paths of the EXR and the display image for ``output``, if they can be written."""
+    if output.suffix.lower() not in PICTURES:  # a device, of which there would have to be two
+        fail(f"-o {output}: write a {listed(PICTURES)}", Exit.USAGE)
     is_exr = output.suffix.lower() == ".exr"
     files = (output, output.with_suffix(".png")) if is_exr else (output.with_suffix(".exr"), output)
     for file in files:

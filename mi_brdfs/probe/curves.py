@@ -15,8 +15,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, context, luminance
-from .bsdf import BSDFProbe, Part
+from .arrays import Array, luminance
+from .bsdf import BSDFProbe
 from .directions import direction, from_plane, on_side, to_plane
 from .variates import lattice, random
 
@@ -125,9 +125,8 @@ def albedo(probe: BSDFProbe, azimuth: float, channel: int | None = None, log2_co
     """
     theta = np.concatenate([np.arange(0, 77.5, 2.5), np.arange(78, 88), [88, 88.5, 89, 89.5, 89.9]])
     points = lattice(log2_count, 5)
-    part = Part("all", context(), None, int(probe.bsdf.flags()), (1,))
     wi = direction(theta, np.full(len(theta), azimuth)).T.repeat(len(points), axis=0)
-    samples = probe.sample(part, wi, np.tile(points, (len(theta), 1)))
+    samples = probe.sample(probe.whole, wi, np.tile(points, (len(theta), 1)))
     weight = _reduced(samples.weight, channel) * samples.eta**2  # refraction compresses radiance, but not energy
     mean = weight.reshape(len(theta), -1).mean(axis=1)
     if probe.data is not None:
