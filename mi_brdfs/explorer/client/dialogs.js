@@ -15,12 +15,11 @@ export function startDialogs() {
     byId("share-of").textContent = session.state.subjects[session.selected]?.name ?? "";
     byId("share-dialog").showModal();
   };
-  for (const what of written) byId(`copy-${what}`).onclick = () => copy(session.info[session.selected][what], what);
-  byId("copy-link").onclick = () => {
-    const uploaded = session.state.subjects.filter(({ bsdf }) => bsdf.file?.startsWith("upload-"));
-    const warning = uploaded.length ? ` It works only while this server runs, which has the uploaded ${uploaded[0].name}.` : "";
-    copy(location.href.replace(/#.*/, "") + fragment(), "link", warning);
-  };
+  for (const what of written)
+    byId(`copy-${what}`).onclick = () =>
+      copy(session.info[session.selected][what], what, [session.state.subjects[session.selected]]);
+  byId("copy-link").onclick = () =>
+    copy(location.href.replace(/#.*/, "") + fragment(), "link", session.state.subjects);
   byId("save-png").onclick = () => cards.picture.tools.querySelector("button")?.click();
   byId("save-exr").onclick = () => ask({ type: "save", what: "exr", subject: session.selected });
   byId("save-page").onclick = () => ask({ type: "save", what: "page", state: session.state });
@@ -43,7 +42,9 @@ function ask(message) {
   byId("shared").textContent = post(message) ? "The server is at it …" : "The server does not answer.";
 }
 
-async function copy(text, what, warning = "") {
+async function copy(text, what, subjects) {
+  const uploaded = subjects.find(({ bsdf }) => bsdf.file?.startsWith("upload-"));
+  const warning = uploaded ? ` It works only while this server runs, which has the uploaded ${uploaded.name}.` : "";
   try {
     await navigator.clipboard.writeText(text);
     byId("shared").textContent = `Copied the ${what}.${warning}`;
