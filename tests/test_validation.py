@@ -514,6 +514,31 @@ def test_colours_are_those_of_rgb_variants():
     assert check({"type": "lambert", "reflectance": colour}, only="colours").verdict("colours") == "pass"
 
 
+@pytest.mark.parametrize("colour", [{"type": "rgb", "value": (0.2, 0.5, 0.7)}, texels(False)], ids=["one", "texels"])
+@pytest.mark.parametrize("factor", [1.0, 1.5])
+def test_derivatives_of_colours_in_spectral_variants(colour, factor):
+    """Of the coefficients of a polynomial, of which some are 10⁵ times others."""
+    mi.set_variant("llvm_ad_spectral")
+
+    def begin(self, props):
+        self.colour = props.get_texture("colour")
+
+    def traverse(self, callback):
+        callback.put("colour", self.colour, mi.ParamFlags.Differentiable)
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        colour = self.colour.eval(si)
+        density = dr.select(active & (si.wi.z > 0) & (wo.z > 0), wo.z * dr.inv_pi, 0)
+        return (factor * colour - (factor - 1) * dr.detach(colour)) * density, density
+
+    def draw(si, v):
+        return mi.warp.square_to_cosine_hemisphere(v)
+
+    plain = stranger("plain_colour", DIFFUSE | FRONT, begin=begin, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
+    verdict = check(plain | {"colour": colour}, only="gradients").verdict("gradients")
+    assert verdict == ("pass" if factor == 1 else "fail")
+
+
 @pytest.mark.parametrize("fault", ["", "exchanged", "grey pairs"])
 def test_channels_of_a_colour_that_is_no_texture(fault):
     colour = mi.Color3f(0.5)

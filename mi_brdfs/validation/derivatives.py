@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from ..parameters import Range, nested
@@ -133,11 +134,16 @@ def _led_back(run: Run, parameter: Parameter, pairs: Pairs, reverse: Array) -> b
 
 def _direction(parameter: Parameter) -> Array:
     """Return by how much each entry of a parameter grows: one channel or texel not as another."""
-    entries = np.size(np.array(parameter.value))
+    entries = abs(np.array(parameter.value, np.float64)).ravel()
+    if len(entries) == 1 or parameter.key.endswith("wavelengths"):  # which must increase
+        return np.ones(len(entries))
     # With this seed the first three, those of a colour, are far from one another.
-    if entries == 1 or parameter.key.endswith("wavelengths"):  # which must increase
-        return np.ones(entries)
-    return np.random.default_rng(64).uniform(0.5, 1.5, entries)
+    direction = np.random.default_rng(64).uniform(0.5, 1.5, len(entries))
+    # For a colour, spectral variants have the coefficients of a polynomial in the wavelength, each of its own size.
+    if mi.is_spectral and len(entries) % 3 == 0 and 0 < entries.sum() < np.inf:
+        sizes = entries.reshape(-1, 3).mean(axis=0)
+        direction = (direction.reshape(-1, 3) * (sizes / sizes.mean())).ravel()
+    return direction
 
 
 def _along(parameter: Parameter, by: float = 1) -> Any:
