@@ -1,7 +1,7 @@
 """Tests of BSDFs, with pytest or anything else that runs ``assert`` statements.
 
+from mi_brdfs.testing import assert_bsdf  # before mitsuba
 import mitsuba as mi
-from mi_brdfs.testing import assert_bsdf
 
 mi.set_variant("llvm_ad_rgb")
 
