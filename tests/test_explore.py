@@ -394,6 +394,19 @@ def test_channels_and_components(client):
     np.testing.assert_allclose(diffuse + glossy, both, atol=0.01)  # by 2048 samples
 
 
+@pytest.mark.parametrize("noticed", [True, False], ids=["noticed", "between steps"])
+def test_a_material_that_comes_back_is_told_and_drawn_again(client, noticed):
+    """The page has forgotten it."""
+    walter, ward = {"type": "walter", "alpha": 0.2}, {"type": "ward", "alpha": 0.3}
+    client.show(walter, ward, views=["polar"])
+    for between in ([walter], [walter, walter]):
+        client.send(*between, views=["polar"])
+        if noticed:
+            client.work()
+        found = client.show(walter, ward, views=["polar"])
+        assert of(found, "subject", 1)[0]["controls"] and of(found, "polar", 1)[0]["curves"]
+
+
 def test_chi_square_on_request(client):
     client.show({"type": "walter", "alpha": 0.2}, views=[])
     for subject in (0, 1):

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
-from itertools import chain, count
+from itertools import chain, count, zip_longest
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -65,6 +65,9 @@ class Session:
         self.closed = False
         self._lock = threading.Lock()
         self._latest: tuple[State, int] | None = None
+        self._changed: set[int] = set()
+        """The places of subjects that were others, or none, in a state since the last step: what was there the page has
+        forgotten, even if it is back."""
         self._edited = 0.0
         self._requests: list[Mapping[str, Any]] = []
         self._fits: Iterator[None] | None = None
@@ -80,6 +83,9 @@ class Session:
     def show(self, state: State, serial: int) -> None:
         """Take a state, in place of the former one."""
         with self._lock:
+            former = self._latest[0].subjects if self._latest else []
+            places = enumerate(zip_longest(former, state.subjects))
+            self._changed |= {k for k, (before, after) in places if before != after}
             self._latest, self._edited = (state, serial), time.perf_counter()
 
     def ask(self, request: Mapping[str, Any]) -> None:
@@ -108,8 +114,13 @@ class Session:
         """Do the next thing, and return whether there was one."""
         with self._lock:
             latest, request = self._latest, self._requests.pop(0) if self._requests else None
+            changed, self._changed = self._changed, set()
         if latest is None or self.closed:
             return False
+        for kept in (self._told, self._sent):
+            for k in changed & kept.keys():
+                del kept[k]
+        self._shown = {place: shown for place, shown in self._shown.items() if place[1] not in changed}
         state, serial = latest
         if request:
             self._answer(request, state)

@@ -5,7 +5,7 @@ From Python::
     from mi_brdfs.rendering.output import display_image, write
     from mi_brdfs.rendering.passes import render
 
-    scene = mi.load_file("scene.xml")
+    scene = mi.load_file("scene.xml", optimize=False)  # or meshes are merged, in another order each time
     picture = render(scene, spp=256)
     picture.image                               # the developed tensor
     write(picture.bitmap, "scene.exr")

@@ -28,14 +28,14 @@ def denoise(colours: np.ndarray | mi.TensorXf | mi.Bitmap) -> np.ndarray:
 
     Raises:
         ImportError: without the extra that brings it.
-        ValueError: if the shape is another one, or they are whole numbers, as those of a PNG, which are not linear.
+        ValueError: if the shape is another one, or they are no floats, as those of a PNG, which are not linear.
     """
     try:
         import mitsuba_oidn
     except ImportError as error:
         raise ImportError('denoising needs the extra of this name: pip install "mi_brdfs[denoise]"') from error
     pixels = np.array(colours, order="C")
-    if np.issubdtype(pixels.dtype, np.integer):
+    if not np.issubdtype(pixels.dtype, np.floating):
         raise ValueError(f"denoise takes linear colours as floats, not {pixels.dtype}")
     pixels = pixels.astype(np.float32)
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 3) or not pixels.size:

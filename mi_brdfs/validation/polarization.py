@@ -99,7 +99,7 @@ def _judged(bsdf: Any, whose: str, mueller: Callable[..., Any], wi: Array, wo: A
     """Return matrices, with those of turned directions if they must be the same."""
     matrix = mueller(bsdf, wi, wo)
     if not isinstance(matrix, mi.Spectrum):
-        raise Skipped("It returns colours, of which Mitsuba keeps the polarization of the light: mi.depolarizer(value).")
+        raise Skipped("It returns colours, and Mitsuba keeps the polarization of the light: mi.depolarizer(value).")
     matrices, turned = _of_f(matrix, wo), _of_f(_turned(mueller, bsdf, wi, wo), wo)
     change = abs(turned - matrices)[..., 0, 0] / np.maximum(matrices[..., 0, 0], 1e-30)
     goes_through = int(bsdf.flags()) & int(mi.BSDFFlags.Null)
