@@ -83,6 +83,13 @@ def test_an_anisotropic_highlight(start):
     assert values(found)["alpha_v"] == pytest.approx(0.3, rel=0.05)
 
 
+def test_a_rotation_goes_all_the_way():
+    """A step is short if it is so in radians: the first ones, where highlights hardly overlap, are in turns."""
+    ward, lights = {"type": "ward", "alpha_u": 0.05, "alpha_v": 0.3}, lamps(0.3, key=([3, 3, 4], 30.0))
+    found = fitted(ward | {"rotation": 0.0}, ward | {"rotation": 0.1}, "ball.bsdf.rotation", lights=lights)
+    assert found.converged and values(found)["rotation"] == pytest.approx(0.1, abs=3e-3)
+
+
 @pytest.mark.parametrize("start", [0.0, 1.0])
 def test_a_share_that_starts_at_an_end(start):
     found = fitted(

@@ -98,7 +98,9 @@ def images(
     local mean P̄ over 5 x 5 pixels and the mean m of all: highlights count no more than what is around. Numbers and
     colours are found by Levenberg–Marquardt steps, whose derivatives are images: radiative backpropagation (``prb``) in
     forward mode. The products of residuals, and of derivatives, are those of renderings with different random numbers,
-    so that noise does not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam.
+    so that noise does not bias them. Bitmaps follow first as a whole, and then texel by texel with Adam. A narrow
+    highlight that overlaps none in the picture gains nothing by a small turn: start with a wide lobe, or near its
+    rotation.
 
     Args:
         scene: a loaded scene without media, in a variant with derivatives, such as ``llvm_ad_rgb``. It is rendered by

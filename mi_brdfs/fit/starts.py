@@ -56,7 +56,7 @@ def _spread(unknown: Unknown) -> tuple[float, float]:
     if unknown.scale == "log" and unknown.quantity.colour:
         return max(low, np.log(1e-3)), min(high, np.log(1e3))
     if unknown.scale == "turns":
-        return -0.5, 0.5
+        return -np.pi, np.pi
     return low, high
 
 

@@ -42,7 +42,9 @@ SCALES = {
         lambda x, whole: x * (1 - x / whole),
     ),
     "asinh": Scale(lambda x, _: np.arcsinh(x), lambda u, _: np.sinh(u), lambda x, _: np.sqrt(1 + x * x)),
-    "turns": Scale(lambda x, _: x, lambda u, _: u, lambda x, _: np.ones_like(x)),
+    "turns": Scale(  # in radians, of which a part is short as it is on the others
+        lambda x, _: 2 * np.pi * x, lambda u, _: u / (2 * np.pi), lambda x, _: np.full_like(x, 1 / (2 * np.pi))
+    ),
 }
 """By name: for positive numbers, shares, numbers of both signs, and rotations, whose range has no ends."""
 
