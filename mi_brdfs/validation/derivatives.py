@@ -98,7 +98,7 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
     if right and outcome.faults and _led_back(run, parameter, pairs, _reverse(run, parameter, pairs)):
         words = "What is made of it is at a limit within the plugin, and its derivatives lead back from there."
         return Finding("gradients", parameter.key, "skip", words)
-    agreement = "it has no influence" if size == 0 else f"they agree to {error / size:.1g}"
+    agreement = f"they agree to {error / size:.1g}" if error < 0.5 * size else "it has no influence beyond rounding"
     return outcome.finding(f"Finite and equal to finite differences: {agreement}.")
 
 
