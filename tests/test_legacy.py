@@ -320,7 +320,7 @@ def test_the_sun_stands_where_it_does(tmp_path, hour, expected):
 
 
 def test_walls_that_are_turned_inside_out_load_beside_others(load, folder):
-    """Mitsuba merges shapes of equal BSDFs, but not these; also where commands load them."""
+    """Mitsuba would merge shapes of equal BSDFs, and fails at these; also where commands load them."""
     wall = '<shape type="rectangle"><bsdf type="diffuse"/>{}</shape>'
     scene, _ = load(wall.format(given(flipNormals=True)) + 2 * wall.format(""))
     with pytest.warns(UserWarning, match="mi-brdfs upgrade"):

@@ -117,10 +117,8 @@ class Session:
             changed, self._changed = self._changed, set()
         if latest is None or self.closed:
             return False
-        for kept in (self._told, self._sent):
-            for k in changed & kept.keys():
-                del kept[k]
-        self._shown = {place: shown for place, shown in self._shown.items() if place[1] not in changed}
+        for k in changed:
+            self._told.pop(k, None)
         state, serial = latest
         if request:
             self._answer(request, state)
@@ -139,6 +137,9 @@ class Session:
             key = key_of(given)
             if self._told.get(k, ("", False))[0] != key:
                 self._told[k] = key, False
+                # What is told anew is drawn anew.
+                self._sent.pop(k, None)
+                self._shown = {place: shown for place, shown in self._shown.items() if place[1] != k}
                 told: dict[str, Any] = {"bsdf": None, "controls": [], "error": None}
                 try:
                     bsdf = self.materials.expanded(given)
