@@ -506,6 +506,10 @@ def test_fits_wait_for_edits_go_on_and_are_cancelled(with_file, monkeypatch):
     with_file.session.ask({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"})
     with_file.session.send = lambda frame: with_file.session.ask({"type": "cancel"}) or with_file.frames.append(frame)
     assert not [it for it in with_file.work() if "bsdf" in it]
+    with_file.session.send = send
+    for request in ({"type": "fit", "subject": 0, "model": "lambert", "metric": "log"}, {"type": "cancel"}):
+        with_file.session.ask(request)
+    assert not of(with_file.work(), "fit")
 
 
 def staged(scene, material=None):

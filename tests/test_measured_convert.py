@@ -6,7 +6,7 @@ from support import pairs
 from test_cli import invoke
 from test_measured_rows import tabulated
 
-from mi_brdfs.measured import Grid, Measurement, Samples, bake, convert, read
+from mi_brdfs.measured import Grid, Measurement, Samples, convert, read
 from mi_brdfs.measured.coordinates import Spherical
 from mi_brdfs.measured.grid import Axis
 from mi_brdfs.probe.bsdf import BSDFProbe
@@ -148,15 +148,9 @@ def test_a_file_is_not_converted_onto_itself_and_stays_whole_when_writing_fails(
     assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_baked_bsdf_takes_unit_vectors():
-    with pytest.raises(ValueError, match="directions must have the length 1, not 2"):
-        bake({"type": "diffuse"}).evaluate(np.array([[0, 0, 1.0]]), np.array([[0, 0, 2.0]]))
-
-
-def test_baking_needs_rgb():
+def test_a_bsdf_is_written_in_rgb(tmp_path):
     with mi.variant_context("llvm_ad_spectral"), pytest.raises(ValueError, match="vectorized rgb variant"):
-        bake({"type": "ward"})
-    assert bake({"type": "ward", "alpha_u": 0.1, "alpha_v": 0.2}).anisotropic
+        convert({"type": "ward"}, tmp_path / "x.csv")
 
 
 def test_the_command(tmp_path):

@@ -64,7 +64,6 @@ TRUNK = {
     "math", "srgb", "observer", "parameters", "microfacet", "lobes", "model", "models", "integrators", "mitsuba",
     "ranges", "names", "variants", "legacy", "loading", "writing", "starting", "given", "preview", "probe", "rendering",
     "__version__",
-    "info", "doctor",
 }
 # fmt: on
 MAY_IMPORT = {

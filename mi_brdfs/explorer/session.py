@@ -89,10 +89,11 @@ class Session:
             self._latest, self._edited = (state, serial), time.perf_counter()
 
     def ask(self, request: Mapping[str, Any]) -> None:
-        """Take a request, or cancel the one at work. Raise a StateError if the page has not said what it shows."""
+        """Take a request, or cancel fits. Raise a StateError if the page has not said what it shows."""
         with self._lock:
             if request["type"] == "cancel":
                 self._fits = None
+                self._requests = [it for it in self._requests if it["type"] != "fit"]
             elif self._latest is None:
                 raise StateError("Nothing is shown yet.")
             else:

@@ -12,8 +12,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from ..given import load_described
 from ..probe.arrays import CENTRE, Array
-from ..probe.bsdf import BSDFProbe, load
+from ..probe.bsdf import BSDFProbe
 from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
@@ -64,19 +65,21 @@ class Conversion:
 
 
 def convert(
-    given: str | Path | Measurement | mi.BSDF | dict | Source, path: str | Path, format: str | None = None
+    given: str | Path | Measurement | mi.BSDF | dict, path: str | Path, format: str | None = None
 ) -> Conversion:
     """Write a measured file, or a BSDF, in another format.
 
-    ``given`` is the path of a measured file or what :func:`read` returned of it; or a BSDF or its dict, which is
-    evaluated in the active variant (:func:`bake`). ``path`` ends in what the format's files end in: ``.binary`` for
-    MERL, ``.bsdf`` for RGL, ``.csv``; ``format`` chooses among formats with the same ending.
+    ``given`` is the path of a measured file or what :func:`read` returned of it; or a BSDF or its dict, of which the
+    reflection on its front side is written, without delta functions, as the active variant evaluates it at texture
+    coordinates (0.4, 0.3). ``path`` ends in what the format's files end in: ``.binary`` for MERL, ``.bsdf`` for RGL,
+    ``.csv``; ``format`` chooses among formats with the same ending.
 
     A file that exists is replaced, once the new one is complete.
 
     Raises:
         FileError: if the given file cannot be read.
-        ValueError: if the format cannot hold what is given, none has this ending, or there is nothing to write.
+        ValueError: if the format cannot hold what is given, none has this ending, there is nothing to write, or a BSDF
+            is given and the active variant is not a vectorized one with rgb.
         OSError: if the file cannot be written.
     """
     path = Path(path)
@@ -87,9 +90,7 @@ def convert(
         raise ValueError(f"{named(path)} is not a regular file; give the name of one")
     writer = _writer(path, format)
     losses: list[str] = []
-    if isinstance(given, Source):
-        source = given
-    elif isinstance(given, (str, Path, Measurement)):
+    if isinstance(given, (str, Path, Measurement)):
         measurement = given if isinstance(given, Measurement) else read(given)
         source = _of_measurement(measurement)
         losses += _not_measured(measurement)
@@ -106,26 +107,11 @@ def convert(
     return Conversion(path, writer.NAME, rms, largest, (*losses, *more))
 
 
-def bake(bsdf: mi.BSDF | dict[str, Any]) -> Source:
-    """Return the reflection of a BSDF on its front side, without delta functions, as what files are written from.
-
-    It is evaluated in the active variant, at texture coordinates (0.4, 0.3). It counts as anisotropic if turning both
-    directions about the normal changes f by more than 0.1 % of its peak.
-
-    Raises:
-        ValueError: if the variant is not a vectorized one with rgb, or the BSDF has no such reflection.
-    """
-    return _baked(_probe(bsdf))
-
-
 def _probe(bsdf: mi.BSDF | dict[str, Any]) -> BSDFProbe:
     variant = mi.variant()
     if not is_measurable(variant) or not mi.is_rgb:
         raise ValueError(f"a BSDF is written in a vectorized rgb variant such as llvm_ad_rgb, not {variant or 'none'}")
-    loaded = load(bsdf) if isinstance(bsdf, dict) else bsdf
-    if not isinstance(loaded, mi.BSDF):
-        raise ValueError(f"{type(loaded).__name__} is not a BSDF of {variant}")
-    return BSDFProbe(loaded)
+    return BSDFProbe(load_described(bsdf))
 
 
 def _baked(probe: BSDFProbe) -> Source:

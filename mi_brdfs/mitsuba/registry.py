@@ -249,7 +249,7 @@ def presets(model: str | None = None) -> list[str]:
     Raises:
         ValueError: if there is no such plugin; the message has the closest one.
     """
-    return published.names(model and find_model(model).plugins[0])
+    return published.names(None if model is None else find_model(model).plugins[0])
 
 
 def _find(name: str, plugins: dict) -> Any:

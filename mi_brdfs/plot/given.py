@@ -37,8 +37,7 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         )
     if not bsdfs:
         raise ValueError('there is no BSDF to plot; give one, such as {"type": "ward"}')
-    own = _labels(bsdfs)
-    found = [pair for given in bsdfs for pair in _loaded(given, own)]
+    found = [pair for given, label in zip(bsdfs, Legend(bsdfs).labels(), strict=True) for pair in _loaded(given, label)]
     if labels is not None:
         if len(labels) != len(found):
             raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
@@ -86,20 +85,66 @@ def quantity(name: str, unit: str = "1/sr", normalize: bool = False, rgb: bool =
     )
 
 
-def constants(bsdfs: Sequence[Any]) -> list[str]:
-    """Return lines with what all dicts have in common, if anything, and what models have otherwise by default: their
-    labels tell the rest."""
-    kinds = dict.fromkeys(str(given.get("type")) for given in bsdfs if isinstance(given, dict))
-    only = _only_plugin(bsdfs)
-    who = only or ("all" if all(isinstance(given, dict) for given in bsdfs) else ", ".join(kinds))
-    same = _common(bsdfs)
-    told = {_plugin(given) for given in bsdfs if isinstance(given, dict) and _parameters(given)}
-    bare = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind and kind not in told and len(bsdfs) > 1]
-    # A colour stays on its line.
-    lines = [_told(f"{who} with", same).replace(", ", ",\N{NO-BREAK SPACE}")] if same else [only] if only else []
-    whose = f"{', '.join(bare)} with " if len(bare) < len({*map(_plugin, bsdfs)}) else ""
-    lines += [f"{whose}default parameters"] if bare else []
-    return lines + [_told(f"{kind} by default:", own) for kind, own in _differing_defaults(bsdfs).items() if own]
+class Legend:
+    """Plugins beside others: what each is called, and what is said of all. Dicts and words are plugins."""
+
+    def __init__(self, bsdfs: Sequence[Any]) -> None:
+        self.kinds = [_plugin(given) for given in bsdfs]
+        self.given = [_parameters(given) if isinstance(given, dict) else None for given in bsdfs]
+        first, *others = [given for given in self.given if given is not None] or [{}]
+        self.stated = {name for given in (first, *others) for name in given}
+        self.common = {name: it for name, it in first.items() if others and all(it == own.get(name) for own in others)}
+        """What several dicts share."""
+        self.own = [self._own(*pair) for pair in zip(self.kinds, self.given, strict=True)]
+        """The parameters of each plugin that not all dicts share; they have their defaults where others are given."""
+        kinds = set(self.kinds)
+        self.only = self.kinds[0] if len(bsdfs) > 1 and len(kinds) == 1 and all(self.own) else ""
+        """The plugin that several are, all told apart by their parameters."""
+
+    def _own(self, kind: str, given: dict[str, str] | None) -> dict[str, str]:
+        own = dict(given or {})
+        declared = find_model(kind).declared() if kind in list_models() else []
+        left_out = [it for it in declared if it.name in self.stated and not own.keys() & set(it.names)]
+        own |= {it.name: it.rows()[0].default for it in left_out}
+        return {name: value for name, value in own.items() if name not in self.common}
+
+    def labels(self) -> list[str]:
+        """Return a label for each plugin: the type, unless it is that of all, and the parameters that distinguish it;
+        an empty text for what is none."""
+        return [kind and _told("" if self.only else kind, own) for kind, own in zip(self.kinds, self.own, strict=True)]
+
+    def constants(self) -> list[str]:
+        """Return lines with what all dicts have in common, if anything, and what models have otherwise by default:
+        their labels tell the rest."""
+        given = list(zip(self.kinds, self.given, strict=True))
+        dicts = dict.fromkeys(kind for kind, own in given if own is not None)
+        who = self.only or ("all" if None not in self.given else ", ".join(dicts))
+        told = {kind for kind, own in given if own}
+        bare = [kind for kind in dict.fromkeys(self.kinds) if kind and kind not in told and len(given) > 1]
+        if self.common:  # a colour stays on its line
+            lines = [_told(f"{who} with", self.common).replace(", ", ",\N{NO-BREAK SPACE}")]
+        else:
+            lines = [self.only] if self.only else []
+        whose = f"{', '.join(bare)} with " if len(bare) < len({*self.kinds}) else ""
+        lines += [f"{whose}default parameters"] if bare else []
+        return lines + [_told(f"{kind} by default:", own) for kind, own in self._differing_defaults().items() if own]
+
+    def _differing_defaults(self) -> dict[str, dict[str, str]]:
+        """Return the defaults of each of a few models that another has otherwise, of parameters that none is given."""
+        kinds = [kind for kind in dict.fromkeys(self.kinds) if kind in list_models()]
+        if "preset" in self.stated or len(kinds) > 4:  # it gives others; and of many, lines would be more than curves
+            return {}
+        found = {
+            kind: {it.name: it.rows()[0].default for it in find_model(kind).declared() if not self.stated & {*it.names}}
+            for kind in kinds
+        }
+        differing = {
+            name
+            for own in found.values()
+            for name in own
+            if any(it.get(name, own[name]) != own[name] for it in found.values())
+        }
+        return {kind: {name: it for name, it in own.items() if name in differing} for kind, own in found.items()}
 
 
 def places(bsdfs: Sequence[Any], count: int) -> list[Place]:
@@ -131,12 +176,6 @@ def _is_ordered(values: list[Any]) -> bool:
     return len(numbers) == len(values) > 2 and numbers in (sorted(numbers), sorted(numbers, reverse=True))
 
 
-def _common(bsdfs: Sequence[Any]) -> dict[str, str]:
-    """Return the parameters that all dicts share; none if there is only one."""
-    first, *others = [_parameters(given) for given in bsdfs if isinstance(given, dict)] or [{}]
-    return {name: value for name, value in first.items() if others and all(it.get(name) == value for it in others)}
-
-
 def _parameters(given: dict) -> dict[str, str]:
     shown = given | ({"filename": Path(given["filename"]).name} if "filename" in given else {})
     return {name: _shown(value) for name, value in shown.items() if name != "type"}
@@ -146,64 +185,15 @@ def _told(word: str, parameters: dict[str, str]) -> str:
     return " ".join(filter(None, [word, *(f"{name}={value}" for name, value in parameters.items())]))
 
 
-def _loaded(given: Any, labels: dict[int, str]) -> Iterator[tuple[str, BSDFProbe]]:
-    """Yield what a user gave, loaded, with its label: for a measured file, its title."""
+def _loaded(given: Any, label: str) -> Iterator[tuple[str, BSDFProbe]]:
+    """Yield what a user gave, loaded, with its label or name: for a measured file, its title."""
     found = ((it.name, it.load()) for it in sources_of(given)) if isinstance(given, str) else [("", given)]
     for name, loaded in found:
         file = measured_file(loaded) if isinstance(loaded, dict) else None
         measurement = read(*file) if file else None
         probe = BSDFProbe(load_described(loaded), data=measurement.data if measurement else None)
         name = name.replace(measurement.path.name, measurement.title) if measurement else name
-        yield labels.get(id(given)) or name or name_of(probe.bsdf), probe
-
-
-def _labels(bsdfs: Sequence[Any]) -> dict[int, str]:
-    """Return a label for each plugin, by the identity of its dict or word: the type, unless it is that of all, and the
-    parameters that distinguish it."""
-    own, only = _distinguishing(bsdfs), _only_plugin(bsdfs)
-    kinds = {id(given): kind for given in bsdfs if (kind := _plugin(given))}
-    return {key: _told("" if only else kind, own[key]) for key, kind in kinds.items()}
-
-
-def _differing_defaults(bsdfs: Sequence[Any]) -> dict[str, dict[str, str]]:
-    """Return the defaults of each of a few models that another has otherwise, of parameters that none is given."""
-    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
-    kinds = [kind for kind in dict.fromkeys(map(_plugin, bsdfs)) if kind in list_models()]
-    if "preset" in stated or len(kinds) > 4:  # it gives others; and of many, lines would be more than curves
-        return {}
-    found = {
-        kind: {it.name: it.rows()[0].default for it in find_model(kind).declared() if not stated & set(it.names)}
-        for kind in kinds
-    }
-    differing = {
-        name
-        for own in found.values()
-        for name in own
-        if any(it.get(name, own[name]) != own[name] for it in found.values())
-    }
-    return {kind: {name: it for name, it in own.items() if name in differing} for kind, own in found.items()}
-
-
-def _only_plugin(bsdfs: Sequence[Any]) -> str:
-    """Return the plugin that several are, all told apart by their parameters, or an empty text."""
-    kinds = {_plugin(given) for given in bsdfs}
-    is_told = len(bsdfs) > 1 and len(kinds) == 1 and all(_distinguishing(bsdfs).values())
-    return kinds.pop() if is_told else ""
-
-
-def _distinguishing(bsdfs: Sequence[Any]) -> dict[int, dict[str, str]]:
-    """Return the parameters of each plugin that not all dicts share, by the identity of its dict or word; they have
-    their defaults where others are given."""
-    found, common = {}, _common(bsdfs)
-    stated = {name for given in bsdfs if isinstance(given, dict) for name in given}
-    for given in bsdfs:
-        if kind := _plugin(given):
-            own = _parameters(given) if isinstance(given, dict) else {}
-            declared = find_model(kind).declared() if kind in list_models() else []
-            left_out = [it for it in declared if it.name in stated and not own.keys() & set(it.names)]
-            own |= {it.name: it.rows()[0].default for it in left_out}
-            found[id(given)] = {name: value for name, value in own.items() if name not in common}
-    return found
+        yield label or name or name_of(probe.bsdf), probe
 
 
 def _plugin(given: Any) -> str:

@@ -20,7 +20,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, largest
 from . import style
-from .given import by_channel, constants, named, places, quantity, with_smooth_part
+from .given import Legend, by_channel, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, WIDTH, incidence, look
 
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
@@ -74,7 +74,7 @@ def hemisphere(
              for name, mark in ((r"$\omega_i$", WI), ("mirror direction", MIRROR))}  # fmt: skip
     if any(np.isnan(picture).any() for row in pictures for picture in row):
         marks["not measured"] = Patch(**HATCHED)
-    style.add_legend(figure, [*marks.values()], [*marks], constants(bsdfs))
+    style.add_legend(figure, [*marks.values()], [*marks], Legend(bsdfs).constants())
     return figure
 
 
@@ -104,7 +104,7 @@ def albedo(
             handles += ax.plot(*curve, label=label, **look(place, name))
     frame_albedo(ax, quantity("directional albedo", unit="", rgb=rgb))
     names = [handle.get_label() for handle in handles]
-    style.add_legend(figure, handles, names, [*constants(bsdfs), *equal], where)
+    style.add_legend(figure, handles, names, [*Legend(bsdfs).constants(), *equal], where)
     return figure
 
 

@@ -19,7 +19,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import Named, by_channel, constants, named, places, quantity, with_smooth_part
+from .given import Legend, Named, by_channel, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, Place, incidence, look
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
@@ -150,7 +150,7 @@ def _planar(
 
     each = [lines(it, k) for k, it in enumerate(found)]
     peaks = [largest(curve.curve.value for part in rows for curve in part) for rows in each]
-    notes = [*constants(bsdfs), *equal]
+    notes = [*Legend(bsdfs).constants(), *equal]
     if any((line.curve.value < 0).any() for rows in each for part in rows for line in part):
         notes.append("Negative values are left out.")
     if "linear" in scales and (ratio := max(peaks) / min(peaks)) > 50:  # the lowest curve cannot be seen

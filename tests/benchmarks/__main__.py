@@ -16,8 +16,8 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from mi_brdfs.cli.doctor import versions
 from mi_brdfs.cli.options import set_tracing_variant
-from mi_brdfs.doctor import versions
 from mi_brdfs.mitsuba import llvm
 
 # After mi_brdfs, which chooses the LLVM that Mitsuba loads.
