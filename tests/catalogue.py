@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from reference import rotate
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,29 @@ class Row:
 
 BOTH = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.5}
 """Two lobes of about the same energy."""
+
+
+def rows_of(plugin, model, pair="", **defaults):
+    """What makes the rows of a plugin whose reference has the same parameters: this gets what the plugin is given, or
+    else these defaults, of which the plugin gets the words, too. Of a ``pair`` of numbers, such as ``alpha``, one alone
+    is both."""
+    words = {name: value for name, value in defaults.items() if isinstance(value, str)}
+
+    def row(name, sharp=False, **given):
+        values = defaults | given
+        turns = values.pop("rotation", 0)
+        if pair:
+            both = values.pop(pair)
+            values = {f"{pair}_u": both, f"{pair}_v": both, **values}
+
+        def reference(wi, wo):
+            return model(rotate(wi, turns), rotate(wo, turns), **values)
+
+        transmits = values.get("domain") == "sphere"
+        return Row(f"{plugin} {name}", {"type": plugin, **words, **given}, reference, sharp, transmits)
+
+    return row
+
 
 _files = [
     importlib.import_module(f"rows.{path.stem}") for path in sorted((Path(__file__).parent / "rows").glob("[a-z]*.py"))

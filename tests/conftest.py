@@ -26,17 +26,6 @@ if "PYTEST_XDIST_WORKER" in os.environ and sys.platform == "linux":
         os.setpriority(os.PRIO_PROCESS, int(thread), 19)
 
 
-def pytest_addoption(parser):
-    parser.addoption(
-        "--derivative-lanes", type=int, default=1 << 16, help="inputs for which fuzzing takes the derivatives of a BSDF"
-    )
-
-
-@pytest.fixture
-def derivative_lanes(request):
-    return request.config.getoption("derivative_lanes")
-
-
 @pytest.fixture
 def llvm_rgb():
     """The variant that most tests run in."""

@@ -17,10 +17,10 @@ import argparse
 import gc
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from statistics import median
 
 import numpy as np
+import psutil
 from fits import MODELS, measured
 
 from mi_brdfs.fit import METRICS, Observations, fit, observe
@@ -90,12 +90,6 @@ def steps(model: str = "walter") -> None:
     report("  by materials, of 1000 directions:", {m: found[f"1000 {m}"] for m in MATERIALS})
 
 
-def resident() -> float:
-    """Return the memory that the process holds, in MiB. Linux only."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
 def memory(models: Iterable[str] = REPEATED, repeats: int = REPEATS) -> list[tuple[float, float]]:
     """Fit several models again and again; print and return ``(resident, the most that Dr.Jit held)`` in MiB after each
     round."""
@@ -106,7 +100,8 @@ def memory(models: Iterable[str] = REPEATED, repeats: int = REPEATS) -> list[tup
         for name, it in own.items():
             fit(it, name, given=MODELS[name].given, starts=2)
         gc.collect()
-        found.append((resident(), dr.detail.malloc_watermark(dr.JitBackend.LLVM) / 2**20))
+        resident = psutil.Process().memory_info().rss / 2**20
+        found.append((resident, dr.detail.malloc_watermark(dr.JitBackend.LLVM) / 2**20))
         print(f"round {k + 1:2}: {found[-1][0]:.1f} MiB resident, Dr.Jit {found[-1][1]:.1f} MiB at most", flush=True)
     return found
 

@@ -1,6 +1,4 @@
-"""How long an edit in the explorer takes, from a slider's event to the frames of a new picture and of new curves on the
-client, through the websocket: ``python tests/latency.py [MODEL…]`` prints medians and 95th percentiles in milliseconds.
-"""
+"""The explorer as a page without a browser meets it: a server, its frames through the websocket, and edits."""
 
 from __future__ import annotations
 
@@ -8,15 +6,12 @@ import asyncio
 import json
 import subprocess
 import sys
-import time
 from typing import IO
 
 import numpy as np
-from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType
+from aiohttp import ClientWebSocketResponse, WSMsgType
 
-EDITS = 30
 SIZE = 256
-PICTURE, CURVES = ["picture"], ["lobe", "polar", "albedo"]
 
 
 def alone(*arguments: str, first: str = "pass") -> list[str]:
@@ -58,15 +53,15 @@ class Page:
         await self.socket.send_str(json.dumps({"type": "state", "serial": self.serial, "state": state}))
 
     async def until(self, *names: str) -> dict:
-        """Frames of the latest state, by name, once there is one of each; with ``seconds`` that it took."""
-        start, found = time.perf_counter(), {}
+        """Frames of the latest state, by name, once there is one of each."""
+        found = {}
         while not set(names) <= set(found):
             frame = await self.frame()
             if frame["name"] == "error" or frame.get("error"):
                 raise ValueError(frame)
             if frame.get("serial") == self.serial or "serial" not in frame:
                 found.setdefault(frame["name"], frame)
-        return {**found, "seconds": time.perf_counter() - start}
+        return found
 
 
 def edited(bsdf: dict, controls: list[dict], rng: np.random.Generator) -> dict:
@@ -81,31 +76,3 @@ def edited(bsdf: dict, controls: list[dict], rng: np.random.Generator) -> dict:
     share = rng.uniform(0.2, 0.8)
     value = low * (high / low) ** share if control["scale"] == "log" else low + share * (high - low)
     return {**bsdf, control["name"]: value}
-
-
-async def measure(address: str, names: list[str] | None) -> None:
-    rng = np.random.default_rng(1)
-    async with ClientSession() as client, client.ws_connect(f"{address}socket", max_msg_size=1 << 26) as socket:
-        page = Page(socket)
-        hello = await page.frame()
-        print(f"{'model':20}{'picture':>10}{'95 %':>8}{'curves':>10}{'95 %':>8}   ms, {SIZE}², {EDITS} edits of each")
-        for name in names or hello["models"]:
-            await page.send({"type": name}, views=[*PICTURE, *CURVES])
-            told = await page.until("subject", *PICTURE, *CURVES)
-            bsdf = told["subject"]["bsdf"] or {"type": name}
-            columns = []
-            for views in (PICTURE, CURVES):
-                seconds = []
-                for _ in range(EDITS + 3):
-                    await page.send(edited(bsdf, told["subject"]["controls"], rng), views=views)
-                    seconds.append((await page.until(*views))["seconds"])
-                columns += list(1e3 * np.quantile(seconds[3:], [0.5, 0.95]))
-            print(f"{name:20}{columns[0]:10.0f}{columns[1]:8.0f}{columns[2]:10.0f}{columns[3]:8.0f}", flush=True)
-
-
-if __name__ == "__main__":
-    process, address = serving("lambert")
-    try:
-        asyncio.run(measure(address, sys.argv[1:]))
-    finally:
-        process.terminate()

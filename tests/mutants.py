@@ -184,27 +184,11 @@ class PowerFlaggedDiffuse(PowerLobe):
     glossy = False
 
 
-class SwappedDensity(MicrofacetLobe):
-    """αu and αv change places in the density only."""
-
-    def eval_pdf(self, wi, wo):
-        value, _ = super().eval_pdf(wi, wo)
-        d = self.distribution
-        swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel)
-        return value, swapped.eval_pdf(wi, wo)[1]
-
-
-class SwappedBeyond(SwappedDensity):
-    """They do for light from a quarter of the azimuths."""
-
-    def eval_pdf(self, wi, wo):
-        value, pdf = MicrofacetLobe.eval_pdf(self, wi, wo)
-        return value, dr.select(third_quadrant(wi), super().eval_pdf(wi, wo)[1], pdf)
-
-
-class UnnormalisedGGX(GGX):
-    def eval(self, facet):
-        return super().eval(facet) * 1.3
+def swapped_beyond(self, wi, wo, value, pdf):
+    """αu and αv change places in the density only, for light from a quarter of the azimuths."""
+    d = self.distribution
+    swapped = MicrofacetLobe(1, type(d)(d.alpha_v, d.alpha_u), self.shadowing, self.fresnel)
+    return value, dr.select(third_quadrant(wi), swapped.eval_pdf(wi, wo)[1], pdf)
 
 
 class OneSidedShadowing(Shadowing):
@@ -236,11 +220,11 @@ def phong(lobe):
     return Mutant
 
 
-def walter(lobe=MicrofacetLobe, distribution=GGX, shadowing=None):
+def walter(lobe=MicrofacetLobe, shadowing=None):
     class Mutant(Walter):
         def lobes(self, p):
             smith = shadowing or SmithGGX(*p.alpha, correlated=False)
-            specular = lobe(p.specular_reflectance, distribution(*p.alpha), smith, filmed(self, p))
+            specular = lobe(p.specular_reflectance, GGX(*p.alpha), smith, filmed(self, p))
             return over_diffuse(p.diffuse_reflectance, specular)
 
     return Mutant
@@ -824,13 +808,11 @@ MUTANTS = [
     mutant("pi twice in the denominator", "albedo", diffuse(lambda wi, wo: dr.inv_pi)),
     mutant("missing cosine", "reciprocity", diffuse(lambda wi, wo: 1 / wo.z)),
     mutant("missing factor four", "albedo", walter(changed(MicrofacetLobe, lambda wi, wo: 4)), alpha=0.3),
-    mutant("unnormalised D", "pdf", walter(distribution=UnnormalisedGGX), alpha=0.05),
     mutant("density without pi", "pdf chi2", diffuse(density=lambda wi, wo: dr.pi)),
     mutant("uniform density of a cosine sampler", "chi2", lambert(UniformDensity)),
     mutant("uniform sampler of a cosine density", "chi2", lambert(UniformSampler)),
     mutant("a variate ignored", "chi2", lambert(drawn(LambertLobe, lambda wi, wo, u, v: warped(mi.Point2f(v.x, 0.3))))),
     mutant("normalisation of a power off by one", "pdf", phong(altered(PowerLobe, off_by_one)), exponent=30.0),
-    mutant("rotated sampler", "chi2", phong(drawn(PowerLobe, turned(0.1))), exponent=300.0),
     mutant("density of the half vector", "pdf chi2", walter(changed(MicrofacetLobe, density=half_vector)), alpha=0.3),
     mutant(
         "density of the half vector, sharp",
@@ -838,7 +820,6 @@ MUTANTS = [
         walter(changed(MicrofacetLobe, density=half_vector)),
         alpha=1e-3,
     ),
-    mutant("alphas swapped in the density", "chi2", ward(SwappedDensity), alpha_u=0.1, alpha_v=0.3),
     mutant(
         "half of the samples lost",
         "pdf chi2",
@@ -884,7 +865,6 @@ MUTANTS = [
     mutant("glossy flagged diffuse", "flags", phong(PowerFlaggedDiffuse), exponent=300.0),
     mutant("anisotropy not flagged", "flags", Ward, flagged(anisotropy_not_flagged), alpha_u=0.1, alpha_v=0.3),
     mutant("one-way shadowing", "reciprocity", walter(shadowing=OneSidedShadowing()), alpha=0.6),
-    mutant("one-way diffuse", "reciprocity", diffuse(lambda wi, wo: 0.5 + 0.5 * wo.z)),
     mutant("not a number at grazing", "finite", diffuse(lambda wi, wo: dr.sqrt(wo.z - 0.01) / dr.sqrt(wo.z - 0.01))),
     mutant("negative at grazing", "finite", diffuse(lambda wi, wo: 1 - 1.1 * dr.square(dr.square(1 - wo.z)))),
     mutant(
@@ -893,7 +873,6 @@ MUTANTS = [
     mutant("half of an azimuth", "continuity", diffuse(half_azimuths)),
     mutant("cut at grazing", "continuity", diffuse(where(lambda wi, wo: dr.minimum(wi.z, wo.z) < 4e-4, 1e-4))),
     mutant("mean of a texture", "textures", colour(lambda texture, si, active: texture.mean())),
-    mutant("texture at a fixed point", "textures", elsewhere(lambda uv: mi.Point2f(0))),
     mutant("drawn as at a fixed point", "textures", Ward, adapted(sample=drawn_elsewhere), alpha=0.3),
     mutant("density zero where light is", "support", diffuse(density=towards(lambda w: w.z < 0.2, 0))),
     mutant("shines through", "horizon", Lambert, adapted(eval_pdf=shines_through)),
@@ -968,7 +947,13 @@ MUTANTS = [
     mutant("lobes drawn by other shares", "chi2", Phong, OtherSharesDrawn),
     mutant("probability omitted of one lobe", "pdf chi2", Phong, ShareForgottenInOne),
     mutant("turned by a degree", "chi2", phong(drawn(PowerLobe, turned(math.radians(1)))), exponent=300.0),
-    mutant("alphas swapped for a quarter of the azimuths", "chi2", ward(SwappedBeyond), alpha_u=0.2, alpha_v=0.3),
+    mutant(
+        "alphas swapped for a quarter of the azimuths",
+        "chi2",
+        ward(altered(MicrofacetLobe, swapped_beyond)),
+        alpha_u=0.2,
+        alpha_v=0.3,
+    ),
     mutant(
         "density of the half vector if anisotropic",
         "pdf",

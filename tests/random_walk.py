@@ -16,10 +16,9 @@ with spherical caps", 2023, doi:10.1111/cgf.14867, those of Beckmann by rejectio
 import math
 
 import numpy as np
+from scipy.special import erfc
 
 TINY = 1e-12  # least horizontal extent of a stretched direction; keeps cotangents finite
-
-_erfc = np.vectorize(math.erfc, otypes=[float])
 
 
 def _stretch(w, alpha_u, alpha_v):
@@ -38,7 +37,7 @@ def smith_lambda(distribution, alpha_u, alpha_v, w):
             upward = r * r / (2 * height * (height + np.hypot(height, r)))
         else:
             a = height / r
-            upward = np.maximum(np.exp(-a * a) / math.sqrt(math.pi) - a * _erfc(a), 0) / (2 * a)
+            upward = np.maximum(np.exp(-a * a) / math.sqrt(math.pi) - a * erfc(a), 0) / (2 * a)
     return np.where(z > 0, upward, -1 - upward)
 
 

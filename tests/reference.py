@@ -343,25 +343,14 @@ def vcavity(i, o):
     return np.minimum(1.0, 2 * cos_h * np.minimum(i[:, 2], o[:, 2]) / _cos_d(i, o))
 
 
-@_brdf
 def cooktorrance(
-    i, o, diffuse_reflectance, specular_reflectance, alpha, distribution, normalization, fresnel=np.ones_like
+    wi, wo, diffuse_reflectance, specular_reflectance, alpha, distribution, normalization, fresnel=np.ones_like
 ):
-    """Cook and Torrance 1982: f = F D G / (4 NL NV), or 4 times it as printed, with 1 / (pi NL NV) (tog82)."""
-    match distribution:
-        case "beckmann":
-            d = beckmann(*_half(i, o), alpha, alpha)
-        case "ggx":
-            d = ggx(*_half(i, o), alpha, alpha)
-        case "blinn":
-            d = blinn(*_half(i, o), 2 / alpha**2 - 2)
-    match normalization:
-        case "modern":
-            scale = 1 / 4
-        case "tog82":
-            scale = 1.0
-    lobe = scale * fresnel(_cos_d(i, o)) * d * vcavity(i, o) / (i[:, 2] * o[:, 2])
-    return diffuse_reflectance / np.pi + specular_reflectance * lobe
+    """Cook and Torrance 1982: facets in grooves, or 4 times as bright as printed, with 1 / (pi NL NV) (tog82)."""
+    alpha, scale = _double(alpha), {"modern": 1.0, "tog82": 4.0}[normalization]
+    width = {"exponent": 2 / alpha**2 - 2} if distribution == "blinn" else {"alpha_u": alpha, "alpha_v": alpha}
+    specular_reflectance = scale * _double(specular_reflectance)
+    return microfacet(wi, wo, diffuse_reflectance, specular_reflectance, distribution, "vcavity", fresnel, **width)
 
 
 @_brdf
@@ -443,18 +432,11 @@ def smith_ggx(v, alpha_u, alpha_v):
     return (np.sqrt(1 + (alpha * tangent) ** 2) - 1) / 2
 
 
-@_brdf
-def walter(i, o, diffuse_reflectance, specular_reflectance, alpha_u, alpha_v, shadowing, fresnel):
-    """Walter et al. 2007: f = F D G / (4 NL NV), G separable, or height-correlated as in Heitz 2014."""
-    lambda_i, lambda_o = smith_ggx(i, alpha_u, alpha_v), smith_ggx(o, alpha_u, alpha_v)
-    match shadowing:
-        case "separable":
-            g = 1 / ((1 + lambda_i) * (1 + lambda_o))
-        case "correlated":
-            g = 1 / (1 + lambda_i + lambda_o)
-    f = fresnel(_cos_d(i, o))
-    d = ggx(*_half(i, o), alpha_u, alpha_v)
-    return diffuse_reflectance / np.pi + specular_reflectance * f * d * g / (4 * i[:, 2] * o[:, 2])
+def walter(wi, wo, diffuse_reflectance, specular_reflectance, alpha_u, alpha_v, shadowing, fresnel):
+    """Walter et al. 2007: facets of GGX with Smith's G, separable, or height-correlated as in Heitz 2014."""
+    smith = {"separable": "smith", "correlated": "smith-correlated"}[shadowing]
+    width = {"alpha_u": alpha_u, "alpha_v": alpha_v}
+    return microfacet(wi, wo, diffuse_reflectance, specular_reflectance, "ggx", smith, fresnel, **width)
 
 
 @_brdf
@@ -479,16 +461,11 @@ def hepd(cos, tangent, phi, kappa, gamma):
     return cos**gamma * _expm1_ratio(kappa * cos**gamma) / (2 * np.pi * integral)
 
 
-@_brdf
-def nishino(i, o, diffuse_reflectance, specular_reflectance, kappa, gamma, variant, fresnel=np.ones_like):
-    """Nishino and Lombardi 2011: their distribution as microfacet normals (microfacet), or by itself (dsbrdf)."""
-    d = hepd(*_half(i, o), kappa, gamma)
-    match variant:
-        case "microfacet":
-            lobe = fresnel(_cos_d(i, o)) * d * vcavity(i, o) / (4 * i[:, 2] * o[:, 2])
-        case "dsbrdf":
-            lobe = d / 4
-    return diffuse_reflectance / np.pi + specular_reflectance * lobe
+def nishino(wi, wo, diffuse_reflectance, specular_reflectance, kappa, gamma, variant, fresnel=np.ones_like):
+    """Nishino and Lombardi 2011: their distribution of facets in grooves (microfacet), or by itself, D / 4 (dsbrdf)."""
+    shadowing, fresnel = {"microfacet": ("vcavity", fresnel), "dsbrdf": ("implicit", np.ones_like)}[variant]
+    width = {"kappa": kappa, "gamma": gamma}
+    return microfacet(wi, wo, diffuse_reflectance, specular_reflectance, "hepd", shadowing, fresnel, **width)
 
 
 def abc(cos, tangent, phi, b, c):

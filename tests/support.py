@@ -69,12 +69,6 @@ def pairs(count: int, seed: int, lowest: float = 0.02) -> tuple[np.ndarray, np.n
     return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
 
 
-def turned(w: np.ndarray, phi: float) -> np.ndarray:
-    """Directions turned about the normal by an angle in radians."""
-    x, y, z = w.T
-    return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
-
-
 def python(code: str, **options) -> subprocess.CompletedProcess:
     """What became of some code in a fresh Python."""
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=900, **options)

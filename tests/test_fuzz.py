@@ -182,12 +182,12 @@ class FuzzedPlugin:
     """A plugin with some options, whose quantities differ from lane to lane, each ``lanes`` of which are filled in one
     of ``examples`` ways. A range without an end has ``largest``."""
 
-    def __init__(self, model, options, largest, examples=1, lanes=LANES, seed=0):
+    def __init__(self, model, options, largest, examples=1, lanes=LANES):
         self.given = {"type": model.plugins[0], **options.words}
         self.quantities, self.largest, self.lanes = options.quantities, largest, lanes
         self.textures = {quantity.name: per_lane() for quantity in self.quantities}
         self.bsdf = mi.load_dict(self.given | self.textures)
-        rng = np.random.default_rng(zlib.crc32(f"{self.given} {options} {seed}".encode()))
+        rng = np.random.default_rng(zlib.crc32(f"{self.given} {options} 0".encode()))
         *settings, wi, wo, u = zip(*(self._filled(rng) for _ in range(examples)), strict=True)
         self.values = {q.name: np.concatenate(v, axis=-1) for q, v in zip(self.quantities, settings, strict=True)}
         self.wi, self.wo, self.u = (np.concatenate(arrays) for arrays in (wi, wo, u))
@@ -330,31 +330,30 @@ def test_values_of_a_scalar_variant(model, options):
 
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model, options", MOSTLY_SLOW)
-def test_derivatives(model, options, derivative_lanes):
+def test_derivatives(model, options):
     """Finite, for every quantity and both directions: those of the value and of the density, which the weights of
     multiple importance sampling have in them, and those of a sample's weight and density."""
-    fuzz_derivatives(model, options, "reverse", derivative_lanes)
+    fuzz_derivatives(model, options, "reverse")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.plugins[0])
-def test_derivatives_forward(model, derivative_lanes):
+def test_derivatives_forward(model):
     """In forward mode other terms overflow."""
-    fuzz_derivatives(model, ways(model.declared())[0], "forward", derivative_lanes)
+    fuzz_derivatives(model, ways(model.declared())[0], "forward")
 
 
-def fuzz_derivatives(model, options, mode, count):
+def fuzz_derivatives(model, options, mode):
     # Kernels of a film's derivatives take long to compile: try them on one model, and on one lobe.
     if model.plugins[0] != "walter":
         options = options.without(*FILM)
     elif "film" in str(options):
         options = options.without("haze", "haze_spread", "retroreflectivity")
-    for first in range(0, count, EXAMPLES * LANES):
-        plugin = FuzzedPlugin(model, options, 1e3, min(-(-(count - first) // LANES), EXAMPLES), seed=first)
-        for name, derivative in plugin.derivatives(mode).items():
-            wrong = ~np.isfinite(derivative).all(axis=1)
-            assert not wrong.any(), f"the derivative for {name}: {plugin.reproduction(None, np.argmax(wrong))}"
+    plugin = FuzzedPlugin(model, options, 1e3, 4)
+    for name, derivative in plugin.derivatives(mode).items():
+        wrong = ~np.isfinite(derivative).all(axis=1)
+        assert not wrong.any(), f"the derivative for {name}: {plugin.reproduction(None, np.argmax(wrong))}"
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.plugins[0])

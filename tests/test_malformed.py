@@ -10,6 +10,7 @@ import sys
 
 import mitsuba as mi
 import numpy as np
+import psutil
 import pytest
 from fuzzing import examples, typical, ways
 from hypothesis import assume
@@ -276,12 +277,8 @@ def test_failures_keep_no_memory():
     """Three hundred, each with a texture of 48 kB, would keep 14 MB each time. Pools that memory is kept in grow at
     first, so one round of four that leaves less than 5 MB behind will do."""
 
-    def resident():
-        with open("/proc/self/statm") as statm:
-            return int(statm.read().split()[1]) * 4096 / 2**20
-
-    levels = [resident()]
+    levels = [psutil.Process().memory_info().rss / 2**20]
     for _ in range(4):
         failures(300)
-        levels.append(resident())
+        levels.append(psutil.Process().memory_info().rss / 2**20)
     assert min(np.diff(levels)) < 5

@@ -81,21 +81,30 @@ def test_nor_by_the_published_ways(way):
         np.testing.assert_allclose(albedos(facets(way, ROUGHNESS[name]), ANGLES), 1, atol=5e-3)
 
 
-@pytest.mark.parametrize("alpha", [(0.2, 0.2), (0.5, 0.5), (1.0, 1.0), (0.8, 0.2), (0.4, 0.1)])
-def test_the_colour_is_that_of_a_walk(alpha):
+@pytest.mark.parametrize(
+    ("alpha", "distribution", "shadowing"),
+    [
+        ((0.2, 0.2), "ggx", "smith"),
+        ((0.5, 0.5), "ggx", "smith"),
+        ((1.0, 1.0), "ggx", "smith"),
+        ((0.8, 0.2), "ggx", "smith-correlated"),
+        ((0.4, 0.1), "ggx", "smith-correlated"),
+        ((0.5, 0.5), "beckmann", "smith-correlated"),
+    ],
+)
+def test_the_colour_is_that_of_a_walk(alpha, distribution, shadowing):
     """The albedo is that of simulated walks, to .005 up to 60° and .02 at 80°, besides three standard errors; to more
     of a film, and of a reflectance that is far from Schlick's. The azimuth is that of smooth facets, which are seen at
     grazing angles again and again. With either term of Smith's."""
-    shadowing = "smith" if alpha[0] == alpha[1] else "smith-correlated"
     angles, azimuth, rng = (5, 45, 60, 80), 90, np.random.default_rng(1)
 
     def every(cos):
         return np.stack([np.broadcast_to(function(cos), (len(cos), 3)) for _, function in FRESNEL.values()], axis=1)
 
-    walks = [walk("ggx", *alpha, direction(theta, azimuth), every, 100_000, rng) for theta in angles]
+    walks = [walk(distribution, *alpha, direction(theta, azimuth), every, 100_000, rng) for theta in angles]
     for k, (name, (given, _)) in enumerate(FRESNEL.items()):
         near, far = {"film": (0.025, 0.03), "exponent 1": (0.02, 0.03)}.get(name, (0.005, 0.02))
-        ours = albedos(facets("walk", alpha, shadowing=shadowing, **given), angles, azimuth)
+        ours = albedos(facets("walk", alpha, distribution, shadowing, **given), angles, azimuth)
         for albedo, theta, (energy, error) in zip(ours, angles, walks, strict=True):
             noise = 3 * np.sqrt((error[:, k] ** 2).sum(axis=0))
             wrong = abs(albedo - energy[:, k].sum(axis=0)) > (near if theta <= 60 else far) + noise

@@ -39,7 +39,7 @@ def lobe(width: float, turn: float = 0, theta: float = 60, side: int = 1) -> tup
 @pytest.fixture(scope="module")
 def reports() -> list[Report]:
     """One that fails and has a hostile name, one that transmits and one without histograms."""
-    wrong = next(mutant for mutant in MUTANTS if mutant.name == "rotated sampler")
+    wrong = next(mutant for mutant in MUTANTS if mutant.name == "alphas swapped for a quarter of the azimuths")
     with mi.variant_context("llvm_ad_rgb"):
         wrap = {"type": "wrap", "domain": "sphere", "wrap": 0.8}
         only = ["pdf", "chi2", "albedo", "efficiency"]

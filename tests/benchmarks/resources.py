@@ -5,13 +5,13 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from statistics import median
 from time import thread_time
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import psutil
 
 from mi_brdfs.bench.pictures import FIRST_SIZE, in_new_process, sphere
 from mi_brdfs.probe.arrays import launched_kernels
@@ -105,7 +105,8 @@ def load_render_discard(bsdfs: list[Plugin], rounds: int) -> tuple[list[list[flo
             dr.eval(mi.render(mi.load_dict(sphere(bsdf, FIRST_SIZE)), spp=1, seed=seed))
             dr.sync_thread()
             seconds[-1].append(thread_time() - start)
-        memory += _resident()
+        if sys.platform == "linux":
+            memory.append(psutil.Process().memory_info().rss / 2**20)
     return seconds[1:], memory
 
 
@@ -113,11 +114,3 @@ def slowdown(seconds: list[list[float]], edge: int) -> float:
     """Return the time of the last rounds over that of the first."""
     early, late = (np.min(part, axis=0) for part in (seconds[:edge], seconds[-edge:]))
     return float(median(late / early))
-
-
-def _resident() -> list[float]:
-    """Return the megabytes that the process holds, if known."""
-    if sys.platform != "linux":
-        return []
-    return [float(line.split()[1]) / 1024 for line in Path("/proc/self/status").read_text().splitlines()
-            if line.startswith("VmRSS:")]  # fmt: skip

@@ -16,16 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import replaced
+from harness import directions, replaced
 
-from mi_brdfs.math import luminance
 from mi_brdfs.microfacet import sampling
 from mi_brdfs.microfacet.forward import ForwardDirections
 from mi_brdfs.microfacet.shadowing import Implicit, SchlickSmith, Shadowing
 from mi_brdfs.microfacet.visible import VisibleNormals
 from mi_brdfs.models.microfacet import Microfacet
-from mi_brdfs.probe.arrays import interaction, numbers
-from mi_brdfs.probe.directions import direction
+from mi_brdfs.probe.arrays import luminance
+from mi_brdfs.probe.bsdf import BSDFProbe
 from mi_brdfs.probe.variates import lattice, sampling_efficiency
 
 import mitsuba as mi  # after mi_brdfs, which chooses the LLVM that they load  # isort: skip
@@ -131,12 +130,8 @@ WITHOUT = [
 
 def measured(given: Plugin) -> tuple[list[float], list[float]]:
     """η and the largest weight over the mean, at each angle."""
-    points = lattice(LOG2_POINTS, 1)
-    wi = np.array([direction(theta, AZIMUTH) for theta in ANGLES])
-    u, x, y = np.tile(points.T, len(ANGLES))
-    si = interaction(np.repeat(wi, len(points), axis=0))
-    _, weight = mi.load_dict(given).sample(mi.BSDFContext(), si, mi.Float(u), mi.Point2f(x, y), True)
-    weights = numbers(luminance(weight)).reshape(len(ANGLES), -1).astype(np.float64)
+    probe = BSDFProbe(mi.load_dict(given))
+    weights = luminance(probe.weights(probe.whole, directions(ANGLES, (AZIMUTH,)), lattice(LOG2_POINTS, 1)))
     return sampling_efficiency(weights).tolist(), (weights.max(axis=1) / weights.mean(axis=1)).tolist()
 
 

@@ -40,8 +40,6 @@ class Fit(NamedTuple):
     tolerance: float = 0.05
     """By which fraction the loss of the code's constants may exceed the least. Of a relative variance of 0.04, which is
     typical, the twentieth is a difference in efficiency of 0.002."""
-    step: float = 0.15
-    """Of the search's first steps, as a fraction of each constant."""
     search: Callable[[], Sequence[float]] | None = None
     """What finds the constants of least loss, if Nelder and Mead's simplex does not do."""
 
@@ -87,7 +85,7 @@ def best(fit: Fit, precision: float) -> tuple[np.ndarray, float]:
         constants = np.array(fit.search())
         return constants, float(fit.loss(*constants))
     code = np.array(fit.code, float)
-    simplex = np.stack([code, *(code + np.diag(np.where(code, fit.step * code, fit.step)))])
+    simplex = np.stack([code, *(code + np.diag(np.where(code, 0.15 * code, 0.15)))])
     # Both tolerances must be met, so an infinite one leaves the decision to the constants'.
     options = {"initial_simplex": simplex, "xatol": precision * abs(code).max(), "fatol": np.inf}
     options["maxfev"] = 40 * (len(code) + 1)
@@ -177,11 +175,9 @@ def relative_variance(lobes: Sequence[Lobe], wi: np.ndarray) -> np.ndarray:
     return 1 / sampling_efficiency(weights(lobes, wi)) - 1
 
 
-def variance_loss(
-    lobes: Sequence[Lobe], angles: Sequence[float], azimuths: Sequence[float] = (0,)
-) -> Callable[[], float]:
+def variance_loss(lobes: Sequence[Lobe], angles: Sequence[float]) -> Callable[[], float]:
     """The mean of 1/η - 1 over lobes and directions."""
-    wi = directions(angles, azimuths)
+    wi = directions(angles)
     return lambda: float(np.mean(relative_variance(lobes, wi)))
 
 

@@ -11,11 +11,11 @@ Rendering 2019, doi:10.2312/sr.20191216, pose the problem.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
+from harness import parser
 from scipy.optimize import nnls
 
 from mi_brdfs.observer import to_srgb
@@ -50,8 +50,6 @@ def table() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true")
-    if parser.parse_args().check:
+    if parser(__doc__).parse_args().check:
         sys.exit(0 if FILE.read_text() == table() else f"{FILE.name} is not what this script writes.")
     FILE.write_text(table())
