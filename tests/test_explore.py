@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from latency import edited
+from explorer_page import edited
 from support import LOFT as FILE
 from support import ROOT
 

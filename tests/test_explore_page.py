@@ -17,7 +17,7 @@ from urllib.request import urlopen
 import mitsuba as mi
 import numpy as np
 import pytest
-from latency import Page, alone, edited, serving
+from explorer_page import Page, alone, edited, serving
 from support import LOFT, ROOT
 from test_cli import invoke
 

@@ -12,9 +12,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..given import load_described
 from ..probe.arrays import CENTRE, Array
-from ..probe.bsdf import BSDFProbe
+from ..probe.bsdf import BSDFProbe, load
 from ..probe.sources import name_of
 from ..variants import is_measurable
 from ..writing import replacing
@@ -111,7 +110,10 @@ def _probe(bsdf: mi.BSDF | dict[str, Any]) -> BSDFProbe:
     variant = mi.variant()
     if not is_measurable(variant) or not mi.is_rgb:
         raise ValueError(f"a BSDF is written in a vectorized rgb variant such as llvm_ad_rgb, not {variant or 'none'}")
-    return BSDFProbe(load_described(bsdf))
+    loaded = load(bsdf) if isinstance(bsdf, dict) else bsdf
+    if not isinstance(loaded, mi.BSDF):
+        raise ValueError(f"{type(loaded).__name__} is not a BSDF of {variant}")
+    return BSDFProbe(loaded)
 
 
 def _baked(probe: BSDFProbe) -> Source:
