@@ -19,6 +19,7 @@ import pytest
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
 from mi_brdfs.measured import FileError, read
+from mi_brdfs.mitsuba import llvm
 from mi_brdfs.probe import directions
 from mi_brdfs.probe.arrays import context as context
 from mi_brdfs.probe.arrays import floats as floats
@@ -73,6 +74,12 @@ def turned(w: np.ndarray, phi: float) -> np.ndarray:
     """Directions turned about the normal by an angle in radians."""
     x, y, z = w.T
     return np.stack([x * np.cos(phi) - y * np.sin(phi), x * np.sin(phi) + y * np.cos(phi), z], axis=-1)
+
+
+def environment(library: str | None = None) -> dict[str, str]:
+    """Variables for a process that is to use an LLVM, or to choose one."""
+    others = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}
+    return others | ({llvm.VARIABLE: library} if library else {})
 
 
 def python(code: str, **options) -> subprocess.CompletedProcess:
