@@ -19,6 +19,7 @@ import pytest
 from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
 from mi_brdfs.measured import FileError, read
+from mi_brdfs.mitsuba import llvm
 from mi_brdfs.probe import directions
 from mi_brdfs.probe.arrays import context as context
 from mi_brdfs.probe.arrays import floats as floats
@@ -67,6 +68,12 @@ def sphere(count: int, seed: int, lowest: float = 0.02) -> np.ndarray:
 def pairs(count: int, seed: int, lowest: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
     """Independent uniform directions ``(wi, wo)``, float64."""
     return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
+
+
+def environment(library: str | None = None) -> dict[str, str]:
+    """Variables for a process that is to use an LLVM, or to choose one."""
+    others = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}
+    return others | ({llvm.VARIABLE: library} if library else {})
 
 
 def python(code: str, **options) -> subprocess.CompletedProcess:

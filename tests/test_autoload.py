@@ -38,10 +38,11 @@ def test_plugins_are_there_without_an_import():
     """In each variant, with what else was registered, and without a word; an ``import mi_brdfs`` changes nothing."""
     own = "import mi_brdfs\nclass Mine(mi_brdfs.Model):\n    'Mine.'\nmi_brdfs.register(Mine)"
     run = python(
-        f"{AUTOLOAD}\nmi.set_variant('scalar_rgb')\n{SHOW}\nmi.set_variant('scalar_spectral')\n{SHOW}\n{own}\n"
-        f"mi.set_variant('scalar_rgb')\n{SHOW}\nprint('mine' in mi_brdfs.list_models(), mi_brdfs is modules[0])"
+        f"{AUTOLOAD}\nmi.set_variant('scalar_rgb')\n{SHOW}\nward = type(mi.load_dict({{'type': 'ward'}}))\n"
+        f"mi.set_variant('scalar_spectral')\n{SHOW}\n{own}\nmi.set_variant('scalar_rgb')\n{SHOW}\n"
+        "print('mine' in mi_brdfs.list_models(), mi_brdfs is modules[0], type(mi.load_dict({'type': 'ward'})) is ward)"
     )
-    assert run.stdout.splitlines() == ["Ward scalar_rgb", "Ward scalar_spectral", "Ward scalar_rgb", "True True"]
+    assert run.stdout.splitlines() == ["Ward scalar_rgb", "Ward scalar_spectral", "Ward scalar_rgb", "True True True"]
     assert run.stderr == ""
 
 

@@ -1,7 +1,6 @@
 """The command line: what it prints and writes, what it says of errors, how it ends; in processes where these matter."""
 
 import contextlib
-import glob
 import os
 import re
 import shutil
@@ -13,7 +12,8 @@ import time
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import LOFT, ROOT
+from support import LOFT, ROOT, environment
+from test_llvm import BAD, needs_bad
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -21,8 +21,6 @@ import mi_brdfs
 from mi_brdfs.cli import app
 from mi_brdfs.mitsuba import llvm
 from mi_brdfs.probe.sources import value_of
-
-BAD_LLVM = next(iter(glob.glob("/usr/lib/*/libLLVM-1[56].so*")), None)
 
 TURNED = '<rotate y="1" angle="180"/>'
 SCENE = (ROOT / "tests" / "rows" / "scenes" / "sheet.xml").read_text()
@@ -43,8 +41,7 @@ def command(*arguments):
 
 
 def run(*arguments, cwd=None, library=None):
-    env = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}
-    env |= {llvm.VARIABLE: library} if library else {}
+    env = environment(library)
     return subprocess.run(command(*arguments), cwd=cwd, env=env, capture_output=True, text=True, timeout=180)
 
 
@@ -117,21 +114,20 @@ def test_doctor_tries_every_backend():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("library", ["/nowhere/libLLVM.so", BAD_LLVM])
+@pytest.mark.parametrize("library", ["/nowhere/libLLVM.so", pytest.param(BAD, marks=needs_bad)])
 def test_doctor_of_an_llvm_that_is_not_there_or_aborts(library):
-    if library == BAD_LLVM and not (BAD_LLVM and llvm._has_avx512()):
-        pytest.skip("no LLVM here that aborts")
     done = run("doctor", library=library)
-    detail = "aborts +the test render died of SIGABRT" if library == BAD_LLVM else "missing"
+    detail = "aborts +the test render died of SIGABRT" if library == BAD else "missing"
     assert re.search(rf"^llvm +{detail}", done.stdout, re.MULTILINE), done.stdout
-    assert done.stderr == "" or library != BAD_LLVM
+    assert done.stderr == "" or library != BAD
     if not {"cuda", "metal"} & {name for name, state in states(done.stdout).items() if state == "works"}:
         assert done.returncode == 1 and f"unset {llvm.VARIABLE}" in done.stdout
 
 
+@pytest.mark.usefixtures("llvm_rgb")
 def test_render_writes_an_exr_and_a_display_image_here(folder):
-    done = run("render", "../scenes/box.xml", "-Dmaterial=ward", "-Dres=20", "--spp", 5, cwd=folder / "work")
-    assert done.returncode == 0, done.stderr
+    done = invoke("render", "../scenes/box.xml", "-Dmaterial=ward", "-Dres=20", "--spp", 5, cwd=folder / "work")
+    assert done.exit_code == 0, done.stderr
     assert done.stdout.split() == ["box.exr", "box.png"]
     assert re.fullmatch(r"5 samples per pixel in [\d.]+ s, \w+_rgb\.\n", done.stderr)
     assert sorted(file.name for file in (folder / "work").iterdir()) == ["box.exr", "box.png"]
@@ -234,9 +230,9 @@ def test_variants_that_do_not_work_here(words, status, told, folder, monkeypatch
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(BAD_LLVM is None or not llvm._has_avx512(), reason="no LLVM here that aborts")
+@needs_bad
 def test_without_a_choice_a_bad_llvm_is_avoided(folder):
-    done = run("render", "scenes/box.xml", cwd=folder, library=BAD_LLVM)
+    done = run("render", "scenes/box.xml", cwd=folder, library=BAD)
     assert done.returncode == 0 and "box.exr" in done.stdout
     if "cuda" not in done.stderr:
         assert f"unset {llvm.VARIABLE}" in done.stderr and "scalar_rgb." in done.stderr

@@ -222,29 +222,22 @@ def test_a_scene_and_its_copy_are_found_from_any_folder(scene, tmp_path, monkeyp
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("small_passes", "ctrl_c")
-def test_also_with_a_worker_killed_in_a_crop_with_aovs(scene):
+@pytest.mark.usefixtures("small_passes")
+def test_a_crop_with_aovs_of_workers_is_that_of_one_thread(scene, address):
     scene.write_text(
         scene.read_text().replace(
             '<integrator type="path"/>',
             '<integrator type="aov"><string name="aovs" value="z:depth"/><integrator type="path"/></integrator>',
         )
     )
-    file, window, passes = SceneFile(str(scene)), [3, 2, 20, 18], []
+    file, window = SceneFile(str(scene)), [3, 2, 20, 18]
     loaded = file.load()
     rendering.crop(loaded.sensors()[0], *window)
     with one_thread():
         expected = render(loaded, spp=64)
-
-    def kill(done, total):
-        passes.append(done)
-        if len(passes) == 2:
-            worker_processes()[0].kill()
-
-    picture = render(loaded, spp=64, on_pass=kill, passes=passes_on(file, window=window, workers=2))
-    assert picture.spp == 64 and len(passes) >= 8
+    picture = render(loaded, spp=64, passes=passes_on(file, window=window, scheduler=address))
+    assert picture.spp == 64
     assert np.array_equal(np.array(expected.bitmap), np.array(picture.bitmap))
-    assert not worker_processes()
 
 
 @pytest.mark.usefixtures("small_passes", "ctrl_c")

@@ -15,10 +15,7 @@ TWO_LOBES = {
 
 OPTIONAL = [
     ("walter", {}, 1, "diffuse_reflectance"),
-    ("cooktorrance", {}, 1, "diffuse_reflectance"),
-    ("microfacet", {}, 1, "diffuse_reflectance"),
     ("low", {}, 1, "diffuse_reflectance"),
-    ("nishino", {}, 1, "diffuse_reflectance"),
     ("burley", {}, 2, "sheen"),
     ("burley", {"sheen": 1.0}, 3, "clearcoat"),
 ]

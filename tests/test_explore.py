@@ -253,12 +253,11 @@ def same_bsdfs():
 
 
 @pytest.mark.usefixtures("same_bsdfs")
-@pytest.mark.parametrize("name", ["kurt", "walter"])
-def test_no_kernel_is_compiled_where_a_value_changes(client, name):
+def test_no_kernel_is_compiled_where_a_value_changes(client):
     views = ["picture", "lobe", "polar", "albedo", "slice", "sampler"]
-    found = client.show({"type": name}, views=views, size=64, theta=30)
+    found = client.show({"type": "kurt"}, views=views, size=64, theta=30)
     told = of(found, "subject")[0]
-    controls, bsdf = told["controls"], told["bsdf"] or {"type": name}
+    controls, bsdf = told["controls"], told["bsdf"] or {"type": "kurt"}
     client.show(bsdf, views=views, size=64, theta=50)  # lobes have other numbers of lines: sizes differ, kernels do not
     rng = np.random.default_rng(4)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):

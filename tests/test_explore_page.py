@@ -275,15 +275,19 @@ def test_a_port_in_use_is_said_in_a_sentence():
     assert done.exit_code == 2 and re.search(r"port \d+ is in use; choose another", done.stderr)
 
 
-@pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("sent", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
-def test_a_signal_ends_it_and_leaves_nothing(tmp_path, monkeypatch, sent):
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    process, address = serving("lambert")
+def end(process, address, sent, folder):
+    """A signal ends a server, and leaves nothing in the folder of temporary files."""
     uploaded(address, "x.bsdf", LOFT.read_bytes())
-    assert len(list(tmp_path.glob("*/upload-1.bsdf"))) == 1
+    assert len(list(folder.glob("*/upload-1.bsdf"))) == 1
     process.send_signal(sent)
-    assert process.wait(20) == 128 + sent and not list(tmp_path.iterdir())
+    assert process.wait(20) == 128 + sent and not list(folder.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_it_and_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    end(*serving("lambert"), signal.SIGINT, tmp_path)
 
 
 def frame_ancestors(address):
@@ -354,9 +358,10 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
     assert started[0].returncode is not None
 
 
-def test_a_saved_file_of_models_is_read_again(tmp_path):
-    """Within two seconds; what is wrong with it is told, and the former models stay."""
-    file = tmp_path / "chalk.py"
+def test_a_saved_file_of_models_is_read_again(tmp_path, tmp_path_factory, monkeypatch):
+    """Within two seconds; what is wrong with it is told, and the former models stay. SIGTERM then leaves nothing."""
+    file, temporary = tmp_path / "chalk.py", tmp_path_factory.mktemp("temporary")
+    monkeypatch.setenv("TMPDIR", str(temporary))
     text = (
         "import mi_brdfs\n\nclass Chalk(mi_brdfs.models.lambert.Lambert):\n"
         '    """Chalk."""\n\n    plugins = ("chalk",)\n    title = "first"\n'
@@ -378,6 +383,7 @@ def test_a_saved_file_of_models_is_read_again(tmp_path):
 
     try:
         connected(address, conversation)
+        end(process, address, signal.SIGTERM, temporary)
     finally:
         process.terminate()
 

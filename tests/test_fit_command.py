@@ -7,19 +7,20 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 from support import LOFT, ROOT
-from test_cli import interrupted, invoke, run
+from test_cli import interrupted, invoke
 
 from mi_brdfs.mitsuba.errors import unwrapped_ctrl_c
 from mi_brdfs.starting import Terminated
 
 
+@pytest.mark.usefixtures("llvm_rgb", "as_before")
 def test_ranks_models_and_writes_rows(tmp_path):
     """Also those of a guest; and what cannot be read is told."""
     (tmp_path / "cut.bsdf").write_bytes(LOFT.read_bytes()[:3000])
     guest = ROOT / "tests" / "guest" / "mi_brdfs_guest.py"
     options = "--import", guest, "--model", "regolith,ward,lambert", "--starts", 2, "--json", "fits.json"
-    done = run("fit", LOFT, "cut.bsdf", *options, cwd=tmp_path)
-    assert done.returncode == 1 and "cut.bsdf" in done.stderr and "Traceback" not in done.stderr
+    done = invoke("fit", LOFT, "cut.bsdf", *options, cwd=tmp_path)
+    assert done.exit_code == 1 and "cut.bsdf" in done.stderr
     rows = [line.split()[0] for line in done.stdout.splitlines() if re.match(r"(ward|lambert|regolith) +0", line)]
     assert rows[0] == "ward" and sorted(rows) == ["lambert", "regolith", "ward"]
     assert "(E2 of Löw et al. 2012), up to 80°; 359 pairs" in done.stdout and '<bsdf type="ward">' in done.stdout

@@ -322,7 +322,6 @@ def test_runs_without_a_variant_for_it(ward):
         ("good", "burley", {"start": {"anisotropic": 0.5}}, "isotropic data fix anisotropic; leave it out."),
         ("good", "ward", {"start": {"exponent": 3}}, "No fit can start at {'exponent': 3}: it is of another plugin"),
         ("good", "ward", {"metric": "logs"}, "There is no metric 'logs'; did you mean 'log'? There are log, l2"),
-        ("good", "wart", {}, "There is no model 'wart'; did you mean 'ward'?"),
         ("good", "kurt", {"lobes": 9}, "There can be 8 lobes at most, not 9."),
         ("good", "ward", {"given": {"alpha": (0.1, 0.2)}}, "could not assign an object of type 'tuple' to key 'alpha'"),
         ("good", "ward", {"starts": 0}, "There is nothing to start from"),

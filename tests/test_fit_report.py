@@ -114,22 +114,24 @@ FIT = "fit", LOFT, "--model", "ward"
 
 
 @pytest.mark.parametrize(
-    ("package", "command"),
+    ("package", "extra", "command"),
     [
-        ("jinja2", (*FIT, "-ofit.html")),
-        ("flip_evaluator", (*FIT, "--image")),
-        ("matplotlib", ("check", "ward", "--html", "check.html")),
+        ("jinja2", "report", (*FIT, "-ofit.html")),
+        ("flip_evaluator", "report", (*FIT, "--image")),
+        ("matplotlib", "report", ("check", "ward", "--html", "check.html")),
+        *((package, "gallery", ("gallery", "ward")) for package in ("PIL", "mitsuba_oidn", "jinja2")),
     ],
 )
-def test_a_missing_package_is_told_before_anything_is_done(package, command, tmp_path, monkeypatch):
-    for name in [*sys.modules]:
+def test_a_missing_package_is_told_before_anything_is_done(package, extra, command, tmp_path, monkeypatch):
+    for name in [package, *sys.modules]:
         if name.partition(".")[0] == package:
             monkeypatch.setitem(sys.modules, name, None)
-        elif re.match(r"mi_brdfs\.(pages|fit\.html|validation\.html)", name):
+        elif re.match(r"mi_brdfs\.(pages|gallery|fit\.html|validation\.html)", name):
             monkeypatch.delitem(sys.modules, name)
     done = invoke(*command, cwd=tmp_path)
     assert done.exit_code == 1 and done.stdout == ""
-    assert "pip install 'mi_brdfs[report]'" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("mi-brdfs: ") and done.stderr.count("\n") == 1
+    assert f"pip install 'mi_brdfs[{extra}]'" in done.stderr
 
 
 @pytest.fixture

@@ -119,25 +119,6 @@ def test_a_plugin_of_somebody_else_is_replaced_with_a_warning():
     assert 'replaces the BSDF "microfacet", registered by another package' in done.stderr
 
 
-@pytest.mark.slow
-def test_a_reload_changes_nothing():
-    """Mitsuba may import a package of plugins anew after each change of variant."""
-    code = """
-    import importlib
-    import mitsuba as mi
-    mi.set_variant("scalar_rgb")
-    import mi_brdfs
-    before = mi.load_dict({"type": "ward"})
-    importlib.reload(mi_brdfs)
-    mi.set_variant("scalar_spectral")
-    importlib.reload(mi_brdfs)
-    mi.set_variant("scalar_rgb")
-    print(type(mi.load_dict({"type": "ward"})) is type(before))
-    """
-    done = python(textwrap.dedent(code))
-    assert (done.stdout, done.stderr) == ("True\n", "")
-
-
 class EntryPoint:
     """An entry point that loads what it is given."""
 

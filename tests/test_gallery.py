@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import sys
 from pathlib import Path
 
 import mitsuba as mi
@@ -296,23 +295,6 @@ def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, 
     done = invoke("gallery", "ward", "-o", "made")
     assert done.exit_code == 1
     assert done.stderr == "mi-brdfs: cannot write to the folder made: Read-only file system\n"
-
-
-@pytest.mark.parametrize("name", ["g.png", "g.HTML"])
-def test_a_folder_is_not_called_like_a_file(folder, name):
-    done = invoke("gallery", "ward", "-o", name)
-    assert done.exit_code == 2 and not Path(name).exists()
-    assert done.stderr == f"mi-brdfs: -o {name}: name a folder, in which there will be a page and its pictures\n"
-
-
-def test_a_missing_package(monkeypatch):
-    for package in ("PIL", "mitsuba_oidn", "jinja2"):
-        with monkeypatch.context() as patch:
-            patch.setitem(sys.modules, package, None)
-            patch.delitem(sys.modules, "mi_brdfs.gallery")
-            done = invoke("gallery", "ward")
-        assert done.exit_code == 1 and done.stdout == "" and done.stderr.count("\n") == 1
-        assert done.stderr.startswith("mi-brdfs: ") and "pip install 'mi_brdfs[gallery]'" in done.stderr
 
 
 # --- The pictures in the documentation ------------------------------------------------------------------------------

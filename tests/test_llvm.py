@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from support import environment
 
 from mi_brdfs.mitsuba import llvm
 
@@ -28,8 +29,7 @@ metadata.files = files
 
 
 def python(code: str, library: str | None = None) -> subprocess.CompletedProcess:
-    env = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}
-    env |= {llvm.VARIABLE: library} if library else {}
+    env = environment(library)
     return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=120)
 
 
