@@ -66,16 +66,3 @@ def test_textures_are_what_the_script_makes():
         assert stored.dtype == image.dtype, name
         # Functions such as atan2 may differ in their last bit among machines.
         np.testing.assert_allclose(stored.astype(int), image.astype(int), atol=1, err_msg=name)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_legacy_scene_keeps_its_parameters():
-    """The camelCase names of Mitsuba 0.6 reach the plugins, as they would under Mitsuba 3's names."""
-    params = mi.traverse(mi.load_file(str(ROOT / "scenes" / "legacy_06.xml")))
-    values = {
-        parameter: params[key][0]
-        for parameter in ("alpha_u", "alpha_v", "exponent")
-        for key in params.keys()
-        if key.endswith(f"{parameter}.value")
-    }
-    assert values == pytest.approx({"alpha_u": 0.07, "alpha_v": 0.25, "exponent": 80})

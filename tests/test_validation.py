@@ -959,16 +959,6 @@ def test_a_job_in_the_background_ignores_ctrl_c():
     assert stdout.splitlines() == ["lambert: passed", "  pass  pdf", "diffuse: passed", "  pass  pdf"]
 
 
-def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
-    text = '<bsdf type="phong" id="mine"><float name="exponent" value="50"/></bsdf>'
-    (tmp_path / "one.xml").write_text(text.replace("<bsdf", '<bsdf version="3.0.0"'))
-    monkeypatch.chdir(pytestconfig.rootpath)
-    done = run(text, tmp_path / "one.xml", "scenes/first_light.xml", "--only", "finite")
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[:4:2] == ["mine: passed", "one.xml: passed"]
-    assert done.stdout.count("first_light.xml:") == 5  # and two lamps
-
-
 @pytest.mark.parametrize(
     "arguments, message",
     [
