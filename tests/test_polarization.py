@@ -9,7 +9,7 @@ import pytest
 import reference as ref
 import scipy.stats
 from generate import polarization
-from support import call, direction, hemisphere, interaction, is_scalar, numbers, observed
+from support import call, direction, hemisphere, interaction, is_scalar, near_mirror, numbers, observed, unit
 
 from mi_brdfs.lobes import WeightedLobe
 from mi_brdfs.probe.arrays import WAVELENGTHS
@@ -31,10 +31,8 @@ def polarized():
 
 def directions(count, seed=1):
     """Pairs of them, every other one near that of a mirror."""
-    wi, wo = hemisphere(count, seed), hemisphere(count, seed + 100)
-    near = wi[::2] * [-1, -1, 1] + 0.1 * wo[::2]
-    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
-    return wi, wo
+    wi = hemisphere(count, seed)
+    return wi, near_mirror(wi, hemisphere(count, seed + 100), 0.1)
 
 
 def context(mode):
@@ -120,10 +118,10 @@ def surface(index):
 
 def of_facets(wi, wo, amplitudes):
     """The Mueller matrices of facets, from what they make of electric fields."""
-    wi, wo = (w.astype(np.float64) / np.linalg.norm(w.astype(np.float64), axis=1, keepdims=True) for w in (wi, wo))
-    towards, away, h = -wo, wi, (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    towards, away = -unit(wo), unit(wi)
+    h = unit(away - towards)
     cos = (h * away).sum(axis=1)
-    s = np.cross(h, away) / np.linalg.norm(np.cross(h, away), axis=1, keepdims=True)
+    s = unit(np.cross(h, away))
 
     def axes(forward):
         x = first_axes(forward)
@@ -223,8 +221,7 @@ def test_the_intensity_is_that_of_unpolarized_variants(mode):
     """But for rounding: of what both compute from f of the exchanged directions, and of the sum of lobes. That of the
     exchanged directions moves a narrow lobe's half vector by 1e-7, about 1e-4 of its width."""
     wi, wo = directions(2000)
-    grazing = hemisphere(2000, 5, 0)[:200] * [1, 1, 1e-4]
-    wi[:200] = grazing / np.linalg.norm(grazing, axis=1, keepdims=True)
+    wi[:200] = unit(hemisphere(2000, 5, 0)[:200] * [1, 1, 1e-4])
     u, v = np.random.default_rng(1).random((2000, 1)), np.random.default_rng(2).random((2000, 2))
     for name, given in SAME.items():
         results = []

@@ -5,17 +5,12 @@ import numpy as np
 import pytest
 from generate import shading
 from plates import NAMES, SCENES, load, shaded
-from support import is_scalar
+from support import is_scalar, unit
 
 rgb = np.array
 
 
 # --- Spheres, and their formulas ---------------------------------------------------------------------------------
-
-
-def unit(v):
-    v = np.asarray(v, np.float64)
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def dot(a, b):
