@@ -489,12 +489,3 @@ def test_what_the_page_says_of_its_picture():
         else:
             assert max(abs(left).max(), abs(right).max()) < 0.01, name
     assert linear[-4:].mean() > 1.5 * linear[:4].mean() > 0.3  # the floor: nearer to Brewster's angle below
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-def test_the_picture_shows_the_scene():
-    """Rendered anew with few samples, the picture differs by its noise, and as JPEG has it."""
-    stored = np.array(mi.Bitmap(str(polarization.PICTURE)), np.float64) / 255
-    now = np.array(polarization.picture(polarization.SCENE, spp=16), np.float64) / 255
-    assert abs(stored - now).mean() < 0.02, "stale: run python docs/generate balls"
