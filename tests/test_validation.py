@@ -957,27 +957,3 @@ def test_a_job_in_the_background_ignores_ctrl_c():
     stdout, stderr = process.communicate()
     assert process.returncode == 0, stderr
     assert stdout.splitlines() == ["lambert: passed", "  pass  pdf", "diffuse: passed", "  pass  pdf"]
-
-
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        ([], "name plugins or files to check, or give --all"),
-        (["ward", "--all"], "name plugins or files to check, or give --all"),
-        (["path"], "path is not a BSDF"),
-        (["ward", "--only", "chi"], "there is no such check; there are finite"),
-        (["ward", "--variant", "scalar_rgb"], "needs a vectorized and unpolarized variant"),
-        (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
-        (["ward", "--angles", "5,95"], "must be in [0, 90) degrees, not 95"),
-        (["ward", "--angles", "5;10"], "write degrees, such as 10,40,70"),
-        (["ward", "--significance", "1"], "--significance 1: it must be in (0, 1)"),
-        (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert, "),
-        (["ward", "--against", "phong", "--only", "pdf"], "--against compares values; --only"),
-        (['<emitter type="constant"/>'], "is not a BSDF"),
-    ],
-)
-def test_wrong_usage(arguments, message, monkeypatch, pytestconfig):
-    monkeypatch.chdir(pytestconfig.rootpath)
-    done = run(*arguments)
-    assert done.exit_code == 2 and done.stdout == ""
-    assert message in done.stderr and done.stderr.count("\n") == 1
