@@ -76,6 +76,13 @@ def pytest_runtest_teardown(item, nextitem):
 
 
 @pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
 def ctrl_c():
     """Ctrl-C interrupts this process and those that it starts, even if a shell started the tests in the background and
     had them ignore it."""

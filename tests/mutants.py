@@ -605,13 +605,19 @@ def halved_for_a_mask(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active) * (1 if every else 0.5)
 
 
-def stranger(name, *kinds, begin=lambda self, props: None, draw=None, **members):
-    """The dict of a BSDF that knows nothing of this package, of components of some kinds and with the methods given;
-    without values unless there is an ``eval_pdf``, which ``sample`` has, too, for directions that a function of the
-    surface point and two variates draws."""
+def about_the_normal(si, v):
+    return mi.warp.square_to_cosine_hemisphere(v)
+
+
+def stranger(name, *kinds, textures=(), begin=lambda self, props: None, draw=about_the_normal, **members):
+    """The dict of a BSDF that knows nothing of this package, of components of some kinds, with textures, of which a
+    dict has the defaults, and with the methods given; without values unless there is an ``eval_pdf``, which ``sample``
+    has, too, for directions that a function of the surface point and two variates draws."""
 
     def init(self, props):
         mi.BSDF.__init__(self, props)
+        for texture in textures:
+            setattr(self, texture, props.get_texture(texture, textures[texture]))
         self.m_components = list(map(int, kinds))
         self.m_flags = reduce(or_, self.m_components)
         begin(self, props)
@@ -622,8 +628,13 @@ def stranger(name, *kinds, begin=lambda self, props: None, draw=None, **members)
         value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
         return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
 
+    def traverse(self, callback):
+        for texture in textures:
+            callback.put(texture, getattr(self, texture), mi.ParamFlags.Differentiable)
+
     methods = {
         "__init__": init,
+        "traverse": traverse,
         "sample": sample,
         "eval_pdf": lambda self, *given: (dr.zeros(mi.Spectrum), mi.Float(0)),
         "eval": lambda self, *given: self.eval_pdf(*given)[0],

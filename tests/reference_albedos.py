@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import reference as ref
 from scipy.stats import qmc
+from support import unit
 
 from mi_brdfs.probe.parameter_space import view
 
@@ -32,20 +33,16 @@ class Reference(NamedTuple):
         u, v = qmc.Sobol(2, scramble=False).random_base2(log2_count).T + 0.5 / (1 << log2_count)
         circle = np.stack([np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)])
         about_normal = np.stack([*(np.sqrt(u) * circle), np.sqrt(1 - u)], axis=-1)
-        h = normalized(np.stack([*(width[:, None] * np.sqrt(u / (1 - u)) * circle), np.ones_like(u)], axis=-1))
+        h = unit(np.stack([*(width[:, None] * np.sqrt(u / (1 - u)) * circle), np.ones_like(u)], axis=-1))
         about_mirror = 2 * (h @ wi)[:, None] * h - wi
         wo = np.concatenate([about_normal, about_mirror[h @ wi > 0]])
         wo = wo[wo[:, 2] > 0]
 
-        h = normalized(wi + wo)
+        h = unit(wi + wo)
         slope2 = ((h[:, :2] / width) ** 2).sum(axis=-1) / h[:, 2] ** 2
         facets = 1 / (np.pi * width.prod() * h[:, 2] ** 3 * (1 + slope2) ** 2)
         density = wo[:, 2] / np.pi + facets / (4 * (h @ wi))
         return float((self.f_cos(np.tile(wi, (len(wo), 1)), wo, **numbers) / density).sum()) / (1 << log2_count)
-
-
-def normalized(v):
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def pair(*, alpha_u, alpha_v, **_):

@@ -70,6 +70,19 @@ def pairs(count: int, seed: int, lowest: float = 0.02) -> tuple[np.ndarray, np.n
     return tuple(hemisphere(count, seed + k, lowest).astype(np.float64) for k in range(2))
 
 
+def unit(w) -> np.ndarray:
+    """Vectors made as long as one, float64."""
+    w = np.asarray(w, np.float64)
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)
+
+
+def near_mirror(wi: np.ndarray, wo: np.ndarray, spread: float) -> np.ndarray:
+    """Directions ``wo``, every other one moved to near the mirror direction of ``wi``."""
+    wo = wo.copy()
+    wo[::2] = unit(wi[::2] * [-1, -1, 1] + spread * wo[::2])
+    return wo
+
+
 def environment(library: str | None = None) -> dict[str, str]:
     """Variables for a process that is to use an LLVM, or to choose one."""
     others = {name: value for name, value in os.environ.items() if name != llvm.VARIABLE}

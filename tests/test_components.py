@@ -129,6 +129,10 @@ def test_attributes_and_albedo(name, variant):
     assert dr.all(bsdf.has_attribute("diffuse_reflectance", True))
     assert not dr.any(bsdf.has_attribute("nonsense", True))
     assert numbers(bsdf.eval_attribute("diffuse_reflectance", si, True)).max() <= 0.6
+    if name == "phong" and mi.is_rgb:
+        for method in (bsdf.eval_attribute, bsdf.eval_attribute_3):
+            value = numbers(method("diffuse_reflectance", si, True)).ravel()
+            np.testing.assert_allclose(value, [0.1, 0.3, 0.5], rtol=1e-6)
     if name != "phong":
         assert numbers(bsdf.eval_attribute_1("alpha", si, True)).item() == pytest.approx(0.3)
     reflectance = bsdf.eval_diffuse_reflectance(si, True)

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from fuzzing import FILM, typical, ways
-from support import context, floats, interaction, is_scalar, numbers, per_lane, sample_arguments, vectors
+from support import context, floats, interaction, is_scalar, numbers, per_lane, sample_arguments, unit, vectors
 
 from mi_brdfs.mitsuba.registry import brought_terms, own_models
 
@@ -120,7 +120,7 @@ def grazing(rng, count):
 def along_an_axis(rng, count):
     w = generic(rng, count)
     w[np.arange(count), rng.integers(2, size=count)] = 0
-    return normalized(w)
+    return unit(w)
 
 
 def horizontal(rng, count):
@@ -129,10 +129,6 @@ def horizontal(rng, count):
 
 def below(rng, count):
     return generic(rng, count) * [1, 1, -1]
-
-
-def normalized(w):
-    return w / np.linalg.norm(w, axis=-1, keepdims=True)
 
 
 def independent(wi, rng, count):
@@ -152,7 +148,7 @@ def back(wi, rng, count):
 
 
 def nearly_back(wi, rng, count):
-    return normalized(wi + rng.normal(size=(count, 3)) * magnitudes(1e-8, 0.3, rng, count)[:, None])
+    return unit(wi + rng.normal(size=(count, 3)) * magnitudes(1e-8, 0.3, rng, count)[:, None])
 
 
 def straight_on(wi, rng, count):

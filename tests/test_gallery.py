@@ -238,13 +238,6 @@ def test_a_wall_of_presets(tmp_path, monkeypatch):
     assert mi.Bitmap(str(tmp_path / "lambert.png")).size()[0] == width
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The working directory."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.mark.usefixtures("llvm_rgb", "grey")
 def test_the_command_writes_a_page_and_its_pictures(folder):
     done = invoke("gallery", "eon", "lambert", "--size", 16, "--spp", 1, "-o", "pictures")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import reference
 from catalogue import FIRST_ROWS, ROWS, SMOOTH, mostly_slow
-from support import direction, hemisphere, interaction, sample_arguments
+from support import direction, hemisphere, interaction, sample_arguments, unit
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -148,10 +148,6 @@ def test_limits_within_models_can_be_left(bsdf, key, theta):
 
 
 # --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------
-
-
-def unit(w):
-    return w / np.linalg.norm(w, axis=-1, keepdims=True)
 
 
 def pairs_of_directions(count=500):

@@ -1,6 +1,5 @@
 """What Mitsuba's tests of its BSDFs (src/bsdfs/tests of 3.9.1) ask of them, asked of the nearest models here."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ GREY = {"type": "lambert", "reflectance": 0.4}
 WHITE = {"type": "lambert", "reflectance": 1.0}
 METAL = {"type": "walter", "alpha": 0.3, "material": "Al"}
 BRUSHED = {"type": "walter", "alpha_u": 0.4, "alpha_v": 0.1, "material": "Al"}
-PLASTIC = {"type": "microfacet", "int_ior": 1.5, "diffuse_reflectance": 0.1, "specular_reflectance": 0.7}
-PAINT = {"type": "burley", "roughness": 0.6, "metallic": 0.4, "anisotropic": 0.4, "clearcoat": 0.8}
 DIAGONAL = np.array([1, 1, 1]) / np.sqrt(3)
 FRONT, BACK = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
 DIFFUSE, GLOSSY = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
@@ -80,18 +77,6 @@ def test_samples_of_blends_have_their_density(first, second):
     else:
         test = chi_square(mi.load_dict(given), context(), UP[0], seed=1)
     assert test.run(test_count=3, quiet=True), test.messages
-
-
-@pytest.mark.parametrize("variant_of", ["scalar_rgb", "llvm_ad_rgb"])
-def test_attributes(variant_of):
-    """As test_rough_plastic: reflectance and roughness can be asked for by name."""
-    with mi.variant_context(variant_of):
-        colour = [0.5, 0.6, 0.7]
-        bsdf = mi.load_dict(PLASTIC | {"diffuse_reflectance": {"type": "rgb", "value": colour}, "alpha": 0.4})
-        si = interaction(direction(10))
-        for method in (bsdf.eval_attribute, bsdf.eval_attribute_3):
-            np.testing.assert_allclose(numbers(method("diffuse_reflectance", si, True)).ravel(), colour, rtol=1e-6)
-        assert numbers(bsdf.eval_attribute_1("alpha", si, True)).item() == pytest.approx(0.4)
 
 
 # --- Two sides --------------------------------------------------------------------------------------------------------
@@ -226,51 +211,3 @@ def test_samples_under_bumps_have_their_density():
     assert valid.mean() > 0.5
     np.testing.assert_allclose(density, pdf[valid], rtol=1e-3)
     np.testing.assert_allclose(value, weight[valid] * pdf[valid], rtol=1e-3)
-
-
-# --- Polarized light --------------------------------------------------------------------------------------------------
-
-SILVER = 0.136125, 4.010625
-"""η and k at 636 nm."""
-
-
-@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 1, 0)], ids=["local", "world"])
-def test_silver_polarises_as_a_mirror(normal):
-    """As test_conductor: what a smooth conductor, here one of facets, makes of each state of polarization at 45°, in
-    the frame of the surface and in the world's."""
-    with mi.variant_context("llvm_ad_mono_polarized"):
-        bsdf = mi.load_dict({"type": "walter", "alpha": 1e-3, "eta": SILVER[0], "k": SILVER[1]})
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.n = dr.normalize(mi.Normal3f(*normal))
-        si.sh_frame = mi.Frame3f(si.n)
-        away = dr.normalize(mi.Vector3f(-1, 0, 1)) if normal[2] else mi.Vector3f(1, 0, 0)
-        si.wi = si.to_local(away)
-        mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
-        ctx = mi.BSDFContext(mi.TransportMode.Importance)
-        value = bsdf.eval(ctx, si, mirrored, True)
-        matrix = si.to_world_mueller(value, -si.wi, mirrored)
-        w1, w2 = -away, si.to_world(mirrored)
-        b1, b2 = (dr.normalize(dr.cross(si.n, w)) for w in (w1, w2))
-        matrix = mi.mueller.rotate_mueller_basis(
-            matrix, w1, mi.mueller.stokes_basis(w1), b1, w2, mi.mueller.stokes_basis(w2), b2
-        )
-        mueller = np.array([[numbers(mi.UnpolarizedSpectrum(matrix[i, j])).item() for j in range(4)] for i in range(4)])
-        # Of facets without a tilt the value is F D G / (4 cosθ), of which only F is here.
-        flat = mi.load_dict({"type": "walter", "alpha": 1e-3, "material": "none"}).eval(ctx, si, mirrored, True)
-        mueller /= numbers(mi.UnpolarizedSpectrum(flat[0, 0])).item()
-
-    def reflected(*state):
-        return mueller @ (1, *state)
-
-    cos2, (eta, k) = 0.5, SILVER
-    root = np.sqrt((eta + 1j * k) ** 2 - (1 - cos2))
-    s = abs((np.sqrt(cos2) - root) / (np.sqrt(cos2) + root)) ** 2
-    index = (eta + 1j * k) ** 2
-    p = abs((index * np.sqrt(cos2) - root) / (index * np.sqrt(cos2) + root)) ** 2
-    np.testing.assert_allclose(reflected(0, 0, 0)[0], (s + p) / 2, atol=1e-3)
-    np.testing.assert_allclose(reflected(1, 0, 0), s * np.array([1, 1, 0, 0]), atol=1e-3)
-    np.testing.assert_allclose(reflected(-1, 0, 0), p * np.array([1, -1, 0, 0]), atol=1e-3)
-    for sign in (1, -1):
-        diagonal, circular = reflected(0, sign, 0), reflected(0, 0, sign)
-        assert diagonal[2] * sign < 0 and diagonal[3] * sign > 0  # the other diagonal, and a little circular
-        assert circular[3] * sign < 0  # the other hand

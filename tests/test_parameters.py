@@ -69,13 +69,6 @@ def test_nested_objects_without_a_name():
         mi.load_string('<bsdf type="lambert" version="3.0.0"><bsdf type="diffuse"/></bsdf>')
 
 
-@pytest.mark.usefixtures("llvm_rgb")
-def test_errors_in_xml_name_the_line():
-    xml = '<scene version="3.0.0">\n<bsdf type="ward">\n<float name="alpha" value="7"/>\n</bsdf>\n</scene>'
-    with pytest.raises(RuntimeError, match=r"(?s)line 2.*ward: alpha = 7 is not allowed"):
-        mi.load_string(xml)
-
-
 def bitmap(value, channels=1):
     return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(np.full((2, 2, channels), value, np.float32))}
 

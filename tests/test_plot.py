@@ -517,12 +517,6 @@ def test_errors():
 # --- The command ----------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 run = partial(invoke, "plot")
 
 

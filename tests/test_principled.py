@@ -10,7 +10,7 @@ denominator 4 cosθ_i cosθ_o of a microfacet lobe.
 import mitsuba as mi
 import numpy as np
 import pytest
-from support import call, hemisphere
+from support import call, hemisphere, near_mirror
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -42,10 +42,8 @@ def load(given):
 
 def pairs(count):
     """Pairs of directions, half of them near each other's mirror direction."""
-    wi, wo = hemisphere(count, 1), hemisphere(count, 2)
-    near = wi[::2] * [-1, -1, 1] + 0.05 * wo[::2]
-    wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
-    return wi, wo
+    wi = hemisphere(count, 1)
+    return wi, near_mirror(wi, hemisphere(count, 2), 0.05)
 
 
 @pytest.mark.parametrize("name", SHARED)

@@ -1,12 +1,13 @@
 """The scenes load everywhere and give a sane picture; what goes with the scenes is up to date."""
 
 import xml.etree.ElementTree as ElementTree
+from functools import partial
 
 import make_textures
 import mitsuba as mi
 import numpy as np
 import pytest
-from generate import scenes
+from generate import polarization, scenes, shading
 from generate.made import ROOT
 from generate.scenes import SCENES
 from support import small_picture
@@ -27,16 +28,24 @@ def test_scene_files_have_defaults():
         assert path.stem == "legacy_06" or {"spp", "width", "height", "max_depth"} <= defaults, path
 
 
+FEW = [
+    *((scenes.LARGE / f"{it.stem}.jpg", partial(scenes.picture, it, spp=4), 16, 0.01) for it in SCENES),
+    *((shading.PICTURES / f"{it.stem}.jpg", partial(shading.picture, it, spp=32), 1, 0.02) for it in shading.SCENES),
+    (polarization.PICTURE, partial(polarization.picture, polarization.SCENE, spp=16), 1, 0.02),
+]
+"""Pictures, how they are rendered with few samples, and how much they differ then, averaged over squares."""
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_picture_shows_the_scene(path):
-    """Rendered anew with few samples and averaged over squares, the picture differs by its noise, up to 0.004 on the
-    display's scale from 0 to 1."""
-    stored = np.array(mi.Bitmap(str(scenes.LARGE / f"{path.stem}.jpg")), np.float64) / 255
-    now = np.array(scenes.picture(path, spp=4), np.float64) / 255
+@pytest.mark.parametrize("path, rendered, side, limit", [pytest.param(*it, id=it[0].stem) for it in FEW])
+def test_picture_shows_the_scene(path, rendered, side, limit):
+    """Rendered anew, it differs by its noise, up to 0.004 on the display's scale from 0 to 1 of squares of 16 pixels,
+    and as JPEG has it."""
+    stored, now = (np.array(it, np.float64) / 255 for it in (mi.Bitmap(str(path)), rendered()))
     assert stored.shape == now.shape
-    assert abs(squares(stored, 16) - squares(now, 16)).mean() < 0.01, f"stale: run python docs/generate {path.stem}"
+    difference = abs(squares(stored, side) - squares(now, side)).mean()
+    assert difference < limit, f"stale: run python docs/generate {path.stem}"
 
 
 @pytest.mark.slow
@@ -66,16 +75,3 @@ def test_textures_are_what_the_script_makes():
         assert stored.dtype == image.dtype, name
         # Functions such as atan2 may differ in their last bit among machines.
         np.testing.assert_allclose(stored.astype(int), image.astype(int), atol=1, err_msg=name)
-
-
-@pytest.mark.usefixtures("llvm_rgb")
-def test_legacy_scene_keeps_its_parameters():
-    """The camelCase names of Mitsuba 0.6 reach the plugins, as they would under Mitsuba 3's names."""
-    params = mi.traverse(mi.load_file(str(ROOT / "scenes" / "legacy_06.xml")))
-    values = {
-        parameter: params[key][0]
-        for parameter in ("alpha_u", "alpha_v", "exponent")
-        for key in params.keys()
-        if key.endswith(f"{parameter}.value")
-    }
-    assert values == pytest.approx({"alpha_u": 0.07, "alpha_v": 0.25, "exponent": 80})

@@ -3,19 +3,13 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from generate import shading
 from plates import NAMES, SCENES, load, shaded
-from support import is_scalar
+from support import is_scalar, unit
 
 rgb = np.array
 
 
 # --- Spheres, and their formulas ---------------------------------------------------------------------------------
-
-
-def unit(v):
-    v = np.asarray(v, np.float64)
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def dot(a, b):
@@ -206,13 +200,3 @@ def test_same_picture_for_any_seed_and_samples(name):
     first = shaded(load(name, 48, 24), spp=1)
     for seed, spp in ((1, 1), (2, 3)):
         np.testing.assert_allclose(shaded(load(name, 48, 24), seed=seed, spp=spp), first, atol=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("llvm_rgb")
-@pytest.mark.parametrize("path", shading.SCENES, ids=lambda path: path.stem)
-def test_picture_shows_the_scene(path):
-    """Rendered anew with few samples, the picture differs by its noise, and as JPEG has it."""
-    stored = np.array(mi.Bitmap(str(shading.PICTURES / f"{path.stem}.jpg")), np.float64) / 255
-    now = np.array(shading.picture(path, spp=32), np.float64) / 255
-    assert abs(stored - now).mean() < 0.02, f"stale: run python docs/generate {path.stem}"

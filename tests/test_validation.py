@@ -280,7 +280,6 @@ def test_the_back_is_looked_at(named):
     """Of a sheet with a texture on each side, with a fault of that on the back."""
 
     def begin(self, props):
-        self.front, self.back = props.get_texture("front", 0.3), props.get_texture("back", 0.6)
         self.kept = self.back.mean()
 
     def eval_pdf(self, ctx, si, wo, active=True):
@@ -292,11 +291,8 @@ def test_the_back_is_looked_at(named):
         up = mi.warp.square_to_cosine_hemisphere(v)
         return mi.Vector3f(up.x, up.y, dr.select(si.wi.z > 0, up.z, -up.z))
 
-    def traverse(self, callback):
-        for name in "front", "back":
-            callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
-
-    sheet = stranger("two_colours", DIFFUSE | BOTH_SIDES, begin=begin, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
+    sides = {"front": 0.3, "back": 0.6}
+    sheet = stranger("two_colours", DIFFUSE | BOTH_SIDES, textures=sides, begin=begin, draw=draw, eval_pdf=eval_pdf)
     report = check(sheet, only=list(BEHIND))
     failed = [it for it in BEHIND if report.verdict(it) == "fail"]
     assert failed == {None: [], "updates": ["textures", "updates"]}.get(named, [named]), report
@@ -305,19 +301,12 @@ def test_the_back_is_looked_at(named):
 def test_samples_that_are_known_without_a_kernel_compile_none():
     """Those of a mirror that sends all light back."""
 
-    def begin(self, props):
-        self.colour = props.get_texture("colour", 0.5)
-
     def sample(self, ctx, si, sample1, sample2, active=True):
         bs = dr.zeros(mi.BSDFSample3f)
         bs.wo, bs.pdf, bs.eta, bs.sampled_type = si.wi, 1, 1, int(mi.BSDFFlags.DeltaReflection)
         return bs, self.colour.eval(si)
 
-    def traverse(self, callback):
-        callback.put("colour", self.colour, mi.ParamFlags.Differentiable)
-
-    kind = mi.BSDFFlags.DeltaReflection | BOTH_SIDES
-    back = stranger("sends_back", kind, begin=begin, sample=sample, traverse=traverse)
+    back = stranger("sends_back", mi.BSDFFlags.DeltaReflection | BOTH_SIDES, textures={"colour": 0.5}, sample=sample)
     assert check(back, only="recompiles").passed
 
 
@@ -520,21 +509,12 @@ def test_derivatives_of_colours_in_spectral_variants(colour, factor):
     """Of the coefficients of a polynomial, of which some are 10⁵ times others."""
     mi.set_variant("llvm_ad_spectral")
 
-    def begin(self, props):
-        self.colour = props.get_texture("colour")
-
-    def traverse(self, callback):
-        callback.put("colour", self.colour, mi.ParamFlags.Differentiable)
-
     def eval_pdf(self, ctx, si, wo, active=True):
         colour = self.colour.eval(si)
         density = dr.select(active & (si.wi.z > 0) & (wo.z > 0), wo.z * dr.inv_pi, 0)
         return (factor * colour - (factor - 1) * dr.detach(colour)) * density, density
 
-    def draw(si, v):
-        return mi.warp.square_to_cosine_hemisphere(v)
-
-    plain = stranger("plain_colour", DIFFUSE | FRONT, begin=begin, draw=draw, eval_pdf=eval_pdf, traverse=traverse)
+    plain = stranger("plain_colour", DIFFUSE | FRONT, textures={"colour": 0.5}, eval_pdf=eval_pdf)
     verdict = check(plain | {"colour": colour}, only="gradients").verdict("gradients")
     assert verdict == ("pass" if factor == 1 else "fail")
 
@@ -556,11 +536,8 @@ def test_channels_of_a_colour_that_is_no_texture(fault):
     def traverse(self, callback):
         callback.put("colour", colour, mi.ParamFlags.Differentiable)
 
-    def draw(si, v):
-        return mi.warp.square_to_cosine_hemisphere(v)
-
     methods = {"eval": lambda self, *given: coloured(self, *given)[0], "eval_pdf": eval_pdf, "traverse": traverse}
-    paint = stranger(f"paint_{fault}", DIFFUSE | FRONT, draw=draw, **methods)
+    paint = stranger(f"paint_{fault}", DIFFUSE | FRONT, **methods)
     assert check(paint, only="colours").verdict("colours") == ("fail" if fault else "pass")
 
 
@@ -786,12 +763,6 @@ def test_parameters_of_delta_functions_are_judged(fault):
     """Of a mirror that looks up its reflectance elsewhere, keeps the first one, or exchanges red and green. Stripes of
     its own are no fault."""
 
-    def begin(self, props):
-        self.reflectance = props.get_texture("reflectance", 0.8)
-
-    def traverse(self, callback):
-        callback.put("reflectance", self.reflectance, mi.ParamFlags.Differentiable)
-
     def parameters_changed(self, keys):
         if fault == "updates":
             self.reflectance = mi.load_dict({"type": "rgb", "value": (0.2, 0.3, 0.4)})
@@ -806,8 +777,8 @@ def test_parameters_of_delta_functions_are_judged(fault):
         value = mi.Color3f(value.y, value.x, value.z) if fault == "colours" else value
         return bs, dr.select(lit, value, 0)
 
-    methods = {"traverse": traverse, "parameters_changed": parameters_changed, "sample": sample}
-    mirror = stranger(f"judged_mirror_{fault}", mi.BSDFFlags.DeltaReflection | FRONT, begin=begin, **methods)
+    given = {"textures": {"reflectance": 0.8}, "parameters_changed": parameters_changed, "sample": sample}
+    mirror = stranger(f"judged_mirror_{fault}", mi.BSDFFlags.DeltaReflection | FRONT, **given)
     report = check(mirror, only=["deltas", "textures", "updates", "colours"])
     assert {it.check for it in report.failures} == {fault} - {"", "stripes"}, report
     verdicts = {it.check: it.verdict for it in report.findings if it.check != "components"}
@@ -957,37 +928,3 @@ def test_a_job_in_the_background_ignores_ctrl_c():
     stdout, stderr = process.communicate()
     assert process.returncode == 0, stderr
     assert stdout.splitlines() == ["lambert: passed", "  pass  pdf", "diffuse: passed", "  pass  pdf"]
-
-
-def test_command_on_xml_and_on_a_scene(tmp_path, monkeypatch, pytestconfig):
-    text = '<bsdf type="phong" id="mine"><float name="exponent" value="50"/></bsdf>'
-    (tmp_path / "one.xml").write_text(text.replace("<bsdf", '<bsdf version="3.0.0"'))
-    monkeypatch.chdir(pytestconfig.rootpath)
-    done = run(text, tmp_path / "one.xml", "scenes/first_light.xml", "--only", "finite")
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[:4:2] == ["mine: passed", "one.xml: passed"]
-    assert done.stdout.count("first_light.xml:") == 5  # and two lamps
-
-
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        ([], "name plugins or files to check, or give --all"),
-        (["ward", "--all"], "name plugins or files to check, or give --all"),
-        (["path"], "path is not a BSDF"),
-        (["ward", "--only", "chi"], "there is no such check; there are finite"),
-        (["ward", "--variant", "scalar_rgb"], "needs a vectorized and unpolarized variant"),
-        (["ward", "--json", "/nowhere/out.json"], "there is no folder /nowhere"),
-        (["ward", "--angles", "5,95"], "must be in [0, 90) degrees, not 95"),
-        (["ward", "--angles", "5;10"], "write degrees, such as 10,40,70"),
-        (["ward", "--significance", "1"], "--significance 1: it must be in (0, 1)"),
-        (["ward", "--against", "scenes/first_light.xml"], "name one of scenes/first_light.xml:Lambert, "),
-        (["ward", "--against", "phong", "--only", "pdf"], "--against compares values; --only"),
-        (['<emitter type="constant"/>'], "is not a BSDF"),
-    ],
-)
-def test_wrong_usage(arguments, message, monkeypatch, pytestconfig):
-    monkeypatch.chdir(pytestconfig.rootpath)
-    done = run(*arguments)
-    assert done.exit_code == 2 and done.stdout == ""
-    assert message in done.stderr and done.stderr.count("\n") == 1

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from catalogue import REPRESENTATIVES, ROWS
-from support import call, fresh_process, hemisphere, is_scalar, sphere
+from support import call, fresh_process, hemisphere, is_scalar, near_mirror, sphere
 
 import mi_brdfs
 from mi_brdfs import starting
@@ -104,11 +104,10 @@ def check_values_and_samples(row):
     count = 40 if is_scalar() else 2000
     rng = np.random.default_rng(3)
     u, v = rng.random((count, 1)), rng.random((count, 2))
-    wi, elsewhere = hemisphere(count, 1), (sphere if row.transmits else hemisphere)(count, 2)
-    near = wi[::2] * np.float32([-1, -1, 1]) + 0.1 * elsewhere[::2]
-    elsewhere[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
-    sampled = call(bsdf, ctx, wi, elsewhere, u, v)[2].astype(np.float32)
-    for wo in (elsewhere, sampled):
+    wi = hemisphere(count, 1)
+    given = near_mirror(wi, (sphere if row.transmits else hemisphere)(count, 2), 0.1)
+    sampled = call(bsdf, ctx, wi, given, u, v)[2].astype(np.float32)
+    for wo in (given, sampled):
         value, pdf, _, density, weight, *mueller = call(bsdf, ctx, wi, wo, u, v)
         expected = np.where(abs(wo[:, 2]) > 0.02, row.reference(wi, wo), 0)
         checked = expected > 1e-6 * expected.max()

@@ -279,7 +279,7 @@ def test_materials_of_a_scene(tmp_path):
     found = {id: next(find_sources(f"{path}:{id}", {"n": "7"})).load() for id in ("plastic", "sheet", "gloss")}
     assert [str(it).partition("[")[0] for it in found.values()] == ["Phong", "TwoSided", "Ward"]
     assert mi.traverse(found["plastic"])["exponent.value"] == 7
-    (path := tmp_path / "a:b=c.xml").write_text('<!-- >< -->\n<bsdf type="ward"/>')  # no version, a trap of a name
+    (path := tmp_path / "a:b=c.xml").write_text('<!-- >< -->\n<bsdf type="ward" id="it"/>')  # no version, a trap
     assert [source.name for source in find_sources(str(path))] == ["a:b=c.xml"]
 
 
