@@ -176,7 +176,7 @@ def _sampler(probe: ComponentProbe, state: State) -> dict[str, Any]:
     angles = np.array([direction(theta, state.phi) for theta in ANGLES])
     eta = sampling_efficiency(luminance(probe.weights(probe.whole, angles, lattice(7, 5))))
     return {
-        "eta": {"x": np.array(ANGLES, float), "y": eta},
+        "curves": [{"channel": "luminance", "x": np.array(ANGLES, float), "y": eta}],
         "histogram": {"edges": edges, "count": counts.tolist()},
         "dots": [[round(float(it), 4) for it in w] for w in samples.wo[samples.lit][:DOTS]],
         "efficiency": float(efficiency) if np.isfinite(efficiency) else None,

@@ -5,7 +5,7 @@ import { connect, sendState } from "./link.js";
 import { cards, makeCard } from "./card.js";
 import { isDark } from "./drawing.js";
 import { AXES, curveTable, drawAlbedo, drawCartesian, drawPolar } from "./plots.js";
-import { drawSampler, samplerTable, startSampler } from "./sampler.js";
+import { drawSampler, startSampler } from "./sampler.js";
 import { drawMaps, mapsImage } from "./maps.js";
 import { drawLobe, lobeImage, startLobe } from "./lobe.js";
 import { drawPicture, pairOf, pictureImage, startPicture, wantedSize } from "./picture.js";
@@ -31,7 +31,7 @@ const CARDS = {
     image: () => mapsImage("slice"),
   },
   hemisphere: { title: "Hemisphere", draw: () => drawMaps("hemisphere"), image: () => mapsImage("hemisphere") },
-  sampler: { title: "Sampler", draw: drawSampler, table: samplerTable },
+  sampler: { title: "Sampler", draw: drawSampler, table: () => curveTable("sampler") },
 };
 
 /** The value of an option that asks for a file. */

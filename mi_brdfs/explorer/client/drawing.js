@@ -70,7 +70,8 @@ export function attach(svg, angleAt, range, cross) {
   );
 }
 
-export const widthOf = (card, most) => Math.max(Math.min(card.figure.clientWidth, most), 240);
+/** Return the width for drawings in a card: rounded down, so that several fit beside each other. */
+export const widthOf = (card, most) => Math.max(Math.min(Math.floor(card.figure.getBoundingClientRect().width), most), 240);
 
 let drawings = 0;
 

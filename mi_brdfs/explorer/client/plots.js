@@ -5,7 +5,7 @@ import { cards, tell } from "./card.js";
 import { LETTER, attach, colourOf, dots, drawing, label, line, path, plot, stroke, summary, valuesAt, widthOf } from "./drawing.js";
 
 /** Return the curves of a view: those of the subjects to be seen, or of one channel each. */
-function curvesOf(view) {
+export function curvesOf(view) {
   return visible().flatMap((k) =>
     (session.shown[view][k]?.curves ?? []).map((curve) => ({
       ...curve,
@@ -247,8 +247,8 @@ export function curveTable(view) {
     [
       "material",
       "channel",
-      `${view === "albedo" ? "theta_i" : view === "cartesian" ? session.state.axis : "theta_o"}_degrees`,
-      view === "albedo" ? "albedo" : session.state.cosine ? "f_cos_theta_o" : "f",
+      `${{ albedo: "theta_i", sampler: "theta_i", cartesian: session.state.axis }[view] ?? "theta_o"}_degrees`,
+      { albedo: "albedo", sampler: "efficiency" }[view] ?? (session.state.cosine ? "f_cos_theta_o" : "f"),
     ],
     ...visible().flatMap((k) =>
       (session.shown[view][k]?.curves ?? []).flatMap((curve) =>

@@ -1,9 +1,10 @@
 // The sampler's view: directions drawn, a histogram of weights, the efficiency over the angle.
-import { DASHES, block, clamp, degrees, element, format, onPointer, radians, shape, subscripted, ticks, valueScale, wrapped } from "./util.js";
+import { block, clamp, degrees, element, format, onPointer, radians, shape, subscripted, ticks, valueScale, wrapped } from "./util.js";
 import { emit, on, session, visible } from "./session.js";
 import { post } from "./link.js";
 import { cards, tell } from "./card.js";
 import { attach, axes, colourOf, drawing, label, line, path, plot, summary, widthOf } from "./drawing.js";
+import { curvesOf } from "./plots.js";
 
 /** What the χ² tests said of the subjects. */
 const verdicts = [];
@@ -30,15 +31,6 @@ function verdictOf(k) {
   return element("p", { class: "marked", style: `--mark:${colourOf(k)}` }, button, ` ${told.join(": ")}`);
 }
 
-/** Return the efficiencies as rows of a table. */
-export function samplerTable() {
-  const rows = visible().flatMap((k) => {
-    const { x = [], y } = session.shown.sampler[k]?.eta ?? {};
-    return x.map((angle, at) => [session.state.subjects[k].name, angle, y[at]]);
-  });
-  return [["material", "theta_i_degrees", "efficiency"], ...rows];
-}
-
 /** Draw the directions, weights and efficiencies of the samplers, with their tests above. */
 export function drawSampler() {
   const card = cards.sampler;
@@ -53,7 +45,7 @@ export function drawSampler() {
   const figures = [
     titled("Directions drawn", drawDots(found, width, Math.max(height, Math.min(width, 300)))),
     titled("Weight ÷ mean weight", drawHistogram(found, width, height)),
-    titled("Efficiency η over θi", drawEfficiency(found, width, height)),
+    titled("Efficiency η over θi", drawEfficiency(width, height)),
   ];
   card.figure.replaceChildren(block("verdicts", ...visible().map(verdictOf)), ...figures);
 }
@@ -140,14 +132,9 @@ function drawHistogram(found, width, height) {
   return it.svg;
 }
 
-function drawEfficiency(found, width, height) {
+function drawEfficiency(width, height) {
   const scale = { of: (value) => value / 1.04, marks: [0, 0.25, 0.5, 0.75, 1].map((value) => [value, format(value)]) };
-  const curves = found.map(([k, { eta }]) => ({
-    ...eta,
-    name: session.state.subjects[k].name,
-    colour: colourOf(k),
-    dash: DASHES[session.state.subjects[k].colour],
-  }));
+  const curves = curvesOf("sampler");
   const { svg } = plot(
     cards.sampler,
     [width, height],
