@@ -49,6 +49,7 @@ def load_described(bsdf: dict[str, Any] | mi.BSDF) -> mi.BSDF:
     """Return a BSDF that is given as a dict, which may be loaded again, or loaded. Raise a ValueError if it is none of
     the active variant, or with what Mitsuba says where it cannot be loaded."""
     if isinstance(bsdf, dict):
+        check_given(bsdf)
         with _as_value_error():
             loaded = load(bsdf)
     else:

@@ -9,6 +9,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import time
 from pathlib import Path
 from urllib.parse import unquote
@@ -356,6 +357,23 @@ def test_a_server_that_cannot_be_heard_is_ended(monkeypatch):
     with pytest.raises(ValueError, match="closed file"):
         explore("ward")
     assert started[0].returncode is not None
+
+
+def test_a_server_with_many_warnings_goes_on(monkeypatch):
+    """More of them than a pipe holds."""
+
+    class Talkative(subprocess.Popen):
+        def __init__(self, command, **options):
+            code = "import sys; print('here', flush=True); sys.stderr.write('x' * 300_000); print('done')"
+            super().__init__([sys.executable, "-c", code], **options)
+
+    monkeypatch.setattr(subprocess, "Popen", Talkative)
+    page = explore("ward")
+    try:
+        page._process.wait(20)
+    finally:
+        page.close()
+    assert page._process.stdout.read() == "done\n"
 
 
 def test_a_saved_file_of_models_is_read_again(tmp_path, tmp_path_factory, monkeypatch):

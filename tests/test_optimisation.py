@@ -271,3 +271,14 @@ def test_derivatives_for_the_extinction(eta, k):
     # The derivatives of terms near 1 cancel.
     np.testing.assert_allclose(np.array(dr.grad(found))[counts], expected[counts], rtol=2e-3, atol=1e-4)
     np.testing.assert_allclose(np.array(found), fresnel_conductor(cos, eta, k), atol=1e-6)
+
+
+def test_where_no_extinction_has_no_derivative_it_is_that_of_another():
+    """Also just below the critical angle of 30°, where that for k² grows without bounds."""
+    cos, step = np.cos(np.radians([10, 29, 29.9])), 1e-6
+    extinction = dr.full(mi.Float, 0, len(cos))
+    dr.enable_grad(extinction)
+    found = Conductor(mi.Float(0.5), extinction)(mi.Float(cos))
+    dr.forward(extinction)
+    within = (fresnel_conductor(cos, 0.5, 0.3 + step) - fresnel_conductor(cos, 0.5, 0.3)) / step
+    np.testing.assert_allclose(np.array(dr.grad(found)), within, rtol=2e-3)

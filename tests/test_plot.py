@@ -13,6 +13,7 @@ from support import LOFT, ROOT, call, context, direction
 from test_cli import invoke
 
 from mi_brdfs import plot
+from mi_brdfs.bench.comparison import compare
 from mi_brdfs.measured import read
 from mi_brdfs.mitsuba.registry import own_models
 from mi_brdfs.plot import command
@@ -501,6 +502,8 @@ ERRORS = [
     (lambda: plot.polar(), "no BSDF to plot"),
     (lambda: plot.polar({"type": "sphere"}), "sphere is not a BSDF of llvm_ad_rgb"),
     (lambda: plot.albedo(3), "int is not a BSDF"),
+    (lambda: plot.cartesian({"alpha": 0.2}), "'alpha': 0.2.* is no BSDF; give a dict such as"),
+    (lambda: compare({"alpha": 0.2}), "'alpha': 0.2.* is no BSDF; give a dict such as"),
     (lambda: plot.hemisphere("ward", angles=()), "no angle"),
     (lambda: plot.polar("ward", scale="logarithmic"), "no scale 'logarithmic'; there are linear, log, both"),
 ]

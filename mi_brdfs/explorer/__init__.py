@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tempfile
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -62,18 +63,20 @@ def explore(*subjects: str | Path | dict[str, Any]) -> Page:
     state = {"subjects": [_subject(it) for it in subjects]}
     words = [it["bsdf"]["file"] for it in state["subjects"] if it["bsdf"]["type"] == MEASURED]
     command = [sys.executable, "-m", "mi_brdfs", "explore", "--port", "0", "--no-browser", "--notebook", "--", *words]
-    process = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout and process.stderr
-    try:
-        address = process.stdout.readline().strip()
-        if not address:
-            raise RuntimeError(process.stderr.read().strip())
-    except BaseException:
-        process.terminate()
-        process.wait()
-        raise
+    # What it warns of later has to go somewhere, too, or it would wait.
+    with tempfile.TemporaryFile("w+") as told:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=told, text=True)
+        assert process.stdout
+        try:
+            address = process.stdout.readline().strip()
+            if not address:
+                process.wait()
+                told.seek(0)
+                raise RuntimeError(told.read().strip())
+        except BaseException:
+            process.terminate()
+            process.wait()
+            raise
     return Page(process, f"{address}#{quote(json.dumps(state))}" if subjects else address)
 
 

@@ -248,6 +248,9 @@ def listening(host: str, port: int | None) -> socket.socket:
             found.bind((host, wanted))
             found.listen()
             return found
+        except (TypeError, UnicodeError):
+            found.close()
+            raise ValueError(f"{host}: no host can have this name") from None
         except OSError as error:
             found.close()
             problem = error

@@ -89,6 +89,9 @@ class Film(Fresnel):
         # Interference may leave nothing at one angle.
         return dr.maximum(self(cos), 0.1 * self.brightness(cos))
 
+    def critical(self) -> Any:
+        return self.base.critical()
+
     def brightness(self, cos: mi.Float) -> mi.Float:
         """The mean over all phases, or at least the rounding error of the reflectance."""
         return dr.maximum(luminance(self._unpolarized(*self._polarized(cos, None))), 1e-7)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, TINY, Spectrum, leaving, luminance, safe_sqrt, square
+from ..math import EPSILON, TINY, Spectrum, leaving, luminance, safe_sqrt
 from ..parameters import Colour, ConductorName, FresnelSet, Index, Number, Reflectance
 from .forward import ForwardDirections
 from .terms import Distribution, Fresnel
@@ -142,6 +142,9 @@ class Dielectric(Interface):
         # An index of 1 reflects nothing at grazing either.
         return dr.select(total, dr.select(step < 0, 1, 0), 0.5 * s * (1 + p))
 
+    def critical(self) -> mi.Float:
+        return dr.detach(safe_sqrt(1 - self.eta * self.eta))
+
     brightness = __call__
 
     def forward(self, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections:
@@ -160,11 +163,19 @@ class Conductor(Interface):
         "k": Colour(None, RANGES["k"], "its extinction coefficient k, relative to the exterior"),
     }  # fmt: skip
 
+    INSIDE = 0.3
+    """A coefficient k with a derivative at all angles."""
+
     def __init__(self, eta: Spectrum, k: Spectrum) -> None:
         self.eta, self.k = eta, k
 
     def __call__(self, cos: mi.Float) -> Spectrum:
-        a, _, modulus = self._refracted(cos)
+        # Beyond the critical angle a k of 0 has a derivative.
+        limit = dr.select(1 - cos * cos - self.eta * self.eta > 0, -1.0, 0.0)
+        return leaving(limit, self.INSIDE, lambda k: self._reflectance(k, cos), self.k)
+
+    def _reflectance(self, k: Spectrum, cos: mi.Float) -> Spectrum:
+        a, _, modulus = self._refracted(k, cos)
         cos2 = cos * cos
         sin2 = 1 - cos2
         even_s, odd_s = modulus + cos2, 2 * cos * a
@@ -175,17 +186,17 @@ class Conductor(Interface):
         return 0.5 * s * (1 + p)
 
     def refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum]:
-        a, b, _ = self._refracted(cos)
+        a, b, _ = self._refracted(self.k, cos)
         return a, b
 
-    def _refracted(self, cos: mi.Float) -> tuple[Spectrum, Spectrum, Spectrum]:
-        """Return a, b and a² + b²."""
-        eta2, k2 = self.eta * self.eta, square(self.k)
+    def _refracted(self, k: Spectrum, cos: mi.Float) -> tuple[Spectrum, Spectrum, Spectrum]:
+        """Return a, b and a² + b² for a coefficient k."""
+        eta2, k2 = self.eta * self.eta, k * k
         real = eta2 - k2 - (1 - cos * cos)
         modulus = safe_sqrt(real * real + 4 * eta2 * k2)
         # The smaller one of a and b as their product over the larger one, which keeps its digits.
         larger = dr.sqrt(dr.maximum(0.5 * (modulus + dr.abs(real)), TINY))
-        smaller, steep = self.eta * self.k / larger, real > 0
+        smaller, steep = self.eta * k / larger, real > 0
         return dr.select(steep, larger, smaller), dr.select(steep, smaller, larger), modulus
 
     def brightness(self, cos: mi.Float) -> mi.Float:

@@ -140,12 +140,23 @@ class Fresnel(Term):
         """Return the approximate luminance of the reflectance, as one number for samplers."""
         return luminance(self(cos))
 
+    def critical(self) -> Any:
+        """Return the cosine up to which all light is reflected, as a number without a derivative."""
+        return 0.0
+
     def combination(self) -> tuple[Spectrum, ...]:
         """Return a, b and c of a + b (1 - cosθ)⁵ - c cosθ (1 - cosθ)⁶, or a and b where c is 0, as for Schlick's
         reflectance. That of conductors (Lazányi and Szirmay-Kalos 2005) and others is replaced by the one nearest to it
         over a hemisphere, which has its mean."""
-        seen = [(self(mi.Float(cos)), weights) for cos, weights in _combination()]
-        normal, rise, raised = (sum(f * weights[k] for f, weights in seen) for k in range(3))
+        critical, coefficients = self.critical(), [0.0, 0.0, 0.0]
+        # Nodes of their own resolve the angles of total reflection, and those that there is less at.
+        for node, weight in gauss_legendre(4):
+            steep, grazing = critical + (1 - critical) * node, critical * node
+            for cos, f in (steep, (1 - critical) * self(mi.Float(steep))), (grazing, critical):
+                basis = _basis(cos)
+                weights = (cos * weight * sum(c * it for c, it in zip(row, basis, strict=True)) for row in _inverse())
+                coefficients = [it + f * w for it, w in zip(coefficients, weights, strict=True)]
+        normal, rise, raised = coefficients
         return normal, rise, -raised
 
     @staticmethod
@@ -172,14 +183,19 @@ class Fresnel(Term):
         return None
 
 
+def _basis(cos: Any) -> tuple[Any, Any, Any]:
+    """Return 1, (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶."""
+    m = 1 - cos
+    m5 = m * m * m * m * m
+    return 1.0, m5, cos * m * m5
+
+
 @functools.cache
-def _combination() -> list[tuple[float, list[float]]]:
-    """Return cosines, each with how much the reflectance there counts in the coefficients of 1, (1 - cosθ)⁵ and cosθ
-    (1 - cosθ)⁶: those of least squares over a hemisphere."""
+def _inverse() -> list[list[float]]:
+    """Return the inverse of the products of these over a hemisphere, by which least squares go."""
     cos, weight = np.array(gauss_legendre(4)).T
-    root = np.sqrt(cos * weight)
-    basis = np.stack([np.ones_like(cos), (1 - cos) ** 5, cos * (1 - cos) ** 6])
-    return list(zip(cos.tolist(), (np.linalg.pinv((basis * root).T) * root).T.tolist(), strict=True))
+    basis = np.stack(np.broadcast_arrays(*_basis(cos)))
+    return np.linalg.inv(basis * (cos * weight) @ basis.T).tolist()
 
 
 class Directions(Protocol):

@@ -96,10 +96,11 @@ class Microfacet(Model):
     exceeds 1, up to 85° and αu : αv = 8 : 1; where one reaches 2, within 0.016 (turquin within 0.05); rough blinn gains
     by itself. Beyond that facets may be up to 0.07 too dark or 0.06 too bright. Where neither α exceeds 1, the albedo
     of walk is up to 4 : 1 that of the simulated walk up to 60° (and at 80°) within 0.005 (0.015) for Schlick's
-    reflectance with an exponent of 5 or more and an f82 of 0.3 or more, and for dielectrics and metals (0.007 where
-    η < 1); within 0.025 (0.03) for smaller exponents and f82, and for films in rgb; and within 0.12 where light is
-    reflected totally, for ``int_ior`` < ``ext_ior``. At 8 : 1 that of metals is within 0.006 (0.01), and where one α
-    reaches 2, that of all these within 0.035.
+    reflectance with an exponent of 5 or more and an f82 of 0.5 or more, and for dielectrics and metals (0.007 where
+    η < 1 <= k, 0.055 where both are less); within 0.025 (0.03) for smaller exponents and f82, and for films in rgb; and
+    within 0.14 (0.07 where αu = αv) where light is reflected totally, for ``int_ior`` < ``ext_ior``. At 8 : 1 that of
+    metals is within 0.006 (0.01), and where one α reaches 2, that of all these within 0.035 (0.08 where light is
+    reflected totally).
 
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``

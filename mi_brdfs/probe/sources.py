@@ -70,7 +70,7 @@ class BSDFSource(NamedTuple):
 def measured_file(given: Mapping[str, Any]) -> tuple[str, Any] | None:
     """Return the path and the quantity of the file of a ``tabulated`` dict, and None for any other, or one that says
     how to extrapolate, as that is to be seen, or is turned, of which tables know nothing."""
-    if given["type"] != "tabulated" or given.keys() & {"extrapolate", "rotation"}:
+    if given.get("type") != "tabulated" or given.keys() & {"extrapolate", "rotation"}:
         return None
     return given["filename"], given.get("quantity", "stated")
 
