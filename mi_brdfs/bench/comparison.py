@@ -87,7 +87,7 @@ def compare(*bsdfs: str | dict | BSDFSource, on_progress: Callable[[str], None] 
     if not is_measurable(mi.variant()):
         raise ValueError(f"Measuring needs a vectorized and unpolarized variant, not {mi.variant()}.")
     found: list[Any] = [it for given in bsdfs for it in (sources_of(given) if isinstance(given, str) else [given])]
-    names = [it.get("type") if isinstance(it, dict) else it.name for it in found]
+    names = [str(it.get("type")) if isinstance(it, dict) else it.name for it in found]
     if len(found) not in (1, 2):
         words = ", ".join(str(it.get("type")) if isinstance(it, dict) else it.word for it in found)
         raise ValueError(f"name one BSDF or two to compare, not {len(found)}: {words}")
