@@ -149,7 +149,7 @@ class Fresnel(Term):
         reflectance. That of conductors (Lazányi and Szirmay-Kalos 2005) and others is replaced by the one nearest to it
         over a hemisphere, which has its mean."""
         critical, coefficients = self.critical(), [0.0, 0.0, 0.0]
-        # Nodes of their own resolve the angles of total reflection, and those that there is less at.
+        # Total reflection begins with a kink: the angles before and beyond it have nodes of their own.
         for node, weight in gauss_legendre(4):
             steep, grazing = critical + (1 - critical) * node, critical * node
             for cos, f in (steep, (1 - critical) * self(mi.Float(steep))), (grazing, critical):
