@@ -242,11 +242,18 @@ def test_a_limit_without_a_derivative_is_left(given, name, start, target):
         assert optimizer[key][0] == pytest.approx(target, abs=0.02), projected
 
 
-@pytest.mark.parametrize("bsdf", [{"type": "orennayar", "model": "full"}, {"type": "roughdiffuse"}])
-def test_a_black_surface_can_become_brighter(bsdf):
-    loaded = mi.load_dict(bsdf | {"reflectance": 0.0})
+@pytest.mark.parametrize(
+    "bsdf, black",
+    [
+        ({"type": "orennayar", "model": "full"}, "reflectance"),
+        ({"type": "roughdiffuse"}, "reflectance"),
+        ({"type": "walter", "alpha": 0.5, "f82": 0.5, "f90": 0.0}, "f0"),
+    ],
+)
+def test_a_black_surface_can_become_brighter(bsdf, black):
+    loaded = mi.load_dict(bsdf | {black: 0.0})
     params = mi.traverse(loaded)
-    key = next(key for key in params.keys() if key.startswith("reflectance"))
+    key = next(key for key in params.keys() if key.startswith(black))
     dr.enable_grad(params[key])
     params.update()
     si = dr.zeros(mi.SurfaceInteraction3f)

@@ -49,7 +49,8 @@ class Schlick(Fresnel):
         if self.f82 is None:
             return self.estimate(cos)
         m2 = dr.square(dr.maximum(1 - cos, 0))
-        return dr.maximum(self.estimate(cos) - self._dip(self.f82) * (cos * m2 * m2 * m2), 0)
+        found = self.estimate(cos) - self._dip(self.f82) * (cos * m2 * m2 * m2)
+        return dr.select(found < 0, 0, found)  # at 0 with its derivative, which leads out of black
 
     def _dip(self, f82: Spectrum) -> Spectrum:
         """Return the multiple."""
