@@ -267,7 +267,7 @@ def leaking_cycles(rounds):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 def test_a_leak_is_caught():
     """What stays alive is part of every kernel after it: each cycle compiles one."""
     seconds, memory = in_new_process(leaking_cycles, 30)

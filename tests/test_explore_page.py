@@ -17,6 +17,7 @@ from urllib.request import urlopen
 
 import mitsuba as mi
 import numpy as np
+import psutil
 import pytest
 from explorer_page import Page, alone, edited, serving
 from support import LOFT, ROOT
@@ -433,7 +434,7 @@ def test_random_edits_leave_the_memory_as_it_is():
             await edits()
         for _ in range(30):
             await edits()
-            sizes.append(int(re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process.pid}/status").read_text())[1]) / 1024)
+            sizes.append(psutil.Process(process.pid).memory_info().rss / 2**20)
 
     try:
         connected(address, conversation)

@@ -348,7 +348,7 @@ def test_wrong_input_gets_a_sentence(data, model, options, sentence, ward, tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="the memory that a process holds is read from /proc")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 def test_repeated_fits_hold_no_more_memory():
     resident = [held for held, _ in fit_cost.memory(["lambert", "low"], repeats=12)]
     assert max(resident[6:]) - min(resident[6:]) < 4

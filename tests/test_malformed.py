@@ -271,7 +271,7 @@ def test_failures_leave_no_model_behind():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 @pytest.mark.usefixtures("llvm_rgb")
 def test_failures_keep_no_memory():
     """Three hundred, each with a texture of 48 kB, would keep 14 MB each time. Pools that memory is kept in grow at

@@ -21,7 +21,7 @@ def test_neither_updates_nor_loading_again_compile_a_kernel(name):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="reads the resident memory from /proc")
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
 def test_loading_300_times_loses_neither_time_nor_memory():
     """The last rounds over all models take as long as the first. A machine that is busier at the end slows them, too:
     then the next process tells. Memory grows by less than 5 MB."""

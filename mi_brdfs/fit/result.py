@@ -106,8 +106,9 @@ class Fit(Data):
     @cached_property
     def scattered(self) -> list[float]:
         """Its own albedo at each angle of ``scatter``, the mean of the channels."""
-        found = self._albedos([direction(theta) for theta, _, _ in self.scatter]) if self.scatter else np.zeros((0, 3))
-        return [float(albedo) for albedo in found.mean(axis=1)]
+        if not self.scatter:
+            return []
+        return [float(it) for it in self._albedos([direction(theta) for theta, _, _ in self.scatter]).mean(axis=1)]
 
     def _albedos(self, wi: list[np.ndarray]) -> np.ndarray:
         with rgb_variant(), warnings.catch_warnings():
