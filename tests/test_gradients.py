@@ -147,6 +147,26 @@ def test_limits_within_models_can_be_left(bsdf, key, theta):
     assert np.isfinite(derivative) and derivative != 0
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_limited_roughness_takes_nothing_from_the_other(sign):
+    """Burley's αv is held, αu is not: the derivative for what both depend on is a difference's, whichever the loss."""
+    bsdf, ctx = (
+        mi.load_dict({"type": "burley", "base_color": 0, "roughness": 0.04, "anisotropic": 0.9}),
+        mi.BSDFContext(),
+    )
+    params = mi.traverse(bsdf)
+    wo = mi.Vector3f(unit([[-0.29, 0.02, 0.95], [-0.2, 0, 0.97]]).T)
+    si = interaction(unit([0.3, 0, 0.95]))
+
+    def loss():
+        return sign * dr.sum(bsdf.eval(ctx, si, wo, True)[0])
+
+    keys = ["roughness.value", "anisotropic.value"]
+    for key, gradient in gradients_of(params, keys, loss).items():
+        (expected,) = differences(params, key, [0], 3e-4, lambda: loss().numpy().item())
+        assert gradient.item() == pytest.approx(expected, rel=0.01), key
+
+
 # --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------
 
 

@@ -14,6 +14,9 @@ from ..microfacet.shadowing import MULTISCATTER, Shadowing
 from ..model import Model, Values
 from ..parameters import Number, Reflectance, Rotation
 
+ALPHA_LIMIT = 0.001
+"""The least α of the specular lobe's facets."""
+
 
 class Burley(Model):
     """Burley's principled BRDF (2012), known as the Disney BRDF.
@@ -93,12 +96,15 @@ class Burley(Model):
         tint = dr.select(black, 1, p.base_color / dr.select(black, 1, brightness))
         dielectric = 1 - p.metallic
         f0 = dr.lerp(0.08 * p.specular * dr.lerp(1, tint, p.spec_tint), p.base_color, p.metallic)
-        alpha, aspect = square(p.roughness), dr.sqrt(1 - 0.9 * p.anisotropic)
-        alpha = [clamp(along, 0.001, dr.inf) for along in (alpha / aspect, alpha * aspect)]
+        aspect2 = 1 - 0.9 * p.anisotropic
+        # Lead back from where the limit holds both; where it holds αv alone, the parameters act through αu as they do.
+        along = clamp(square(p.roughness) / dr.sqrt(aspect2), ALPHA_LIMIT, dr.inf)
+        across = along * aspect2
+        across = dr.select(across < ALPHA_LIMIT, ALPHA_LIMIT, across)
         lobes: list[Lobe] = [BaseLobe(dielectric * p.base_color, p.roughness, p.subsurface)]
         if p.sheen is not None:
             lobes.append(SheenLobe(dielectric * p.sheen * dr.lerp(1, tint, p.sheen_tint)))
-        facets = GGX(*alpha)
+        facets = GGX(along, across)
         facets.anisotropic = self.is_stretched
         lobes += facet_lobes(self, p, 1, facets, lambda it: it.smith(correlated=False), Schlick(f0))
         if p.clearcoat is not None:
