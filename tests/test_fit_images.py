@@ -357,8 +357,9 @@ WRONG = {
         {"pictures": np.uint8(255 * GREY)},
         "A picture of integers has no linear values: give its file, or mi.Bitmap(it), which is sRGB.",
     ),
-    "black": ({"pictures": 0 * GREY}, "A picture is black, or has no numbers."),
-    "gaps": ({"pictures": np.nan * GREY}, "A picture is black, or has no numbers."),
+    "black": ({"pictures": 0 * GREY}, "A picture is black, or has no positive numbers."),
+    "negative": ({"pictures": -GREY}, "A picture is black, or has no positive numbers."),
+    "gaps": ({"pictures": np.nan * GREY}, "A picture is black, or has no positive numbers."),
     "file": ({"pictures": "missing.exr"}, "There is no file missing.exr."),
     "no picture": ({"pictures": __file__}, f"Mitsuba cannot read {__file__}: [Bitmap] Bitmap: Unknown file format!"),
     "layers": (

@@ -290,6 +290,11 @@ def test_a_folder_that_cannot_be_written_to_is_told_of_before_rendering(folder, 
     assert done.stderr == "mi-brdfs: cannot write to the folder made: Read-only file system\n"
 
 
+def test_a_picture_without_pixels_or_samples_is_refused():
+    with pytest.raises(ValueError, match="needs spp >= 1 and size >= 16, not 16 and 0"):
+        gallery("ward", size=0)  # one name is no list of letters
+
+
 # --- The pictures in the documentation ------------------------------------------------------------------------------
 
 STALE = "looks different; if that is meant, run python docs/generate"

@@ -505,6 +505,10 @@ ERRORS = [
     (lambda: plot.cartesian({"alpha": 0.2}), "'alpha': 0.2.* is no BSDF; give a dict such as"),
     (lambda: compare({"alpha": 0.2}), "'alpha': 0.2.* is no BSDF; give a dict such as"),
     (lambda: plot.hemisphere("ward", angles=()), "no angle"),
+    (lambda: plot.albedo("ward", azimuth=np.inf), "azimuth inf: give degrees"),
+    (lambda: plot.cartesian("ward", azimuth=np.nan), "azimuth nan: give degrees"),
+    (lambda: plot.hemisphere("ward", azimuth=np.nan), "azimuth nan: give degrees"),
+    (lambda: plot.hemisphere("ward", resolution=20.5), "resolution 20.5: give from 2 to 4096 pixels"),
     (lambda: plot.polar("ward", scale="logarithmic"), "no scale 'logarithmic'; there are linear, log, both"),
 ]
 

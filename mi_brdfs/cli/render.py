@@ -67,7 +67,7 @@ def render(
         if name in RESERVED:
             fail(f"-D {name}: Mitsuba reserves this name; rename the parameter in the scene", Exit.USAGE)
     window = _window(crop)
-    files = output_files(output or Path(scene.stem + ".exr"))
+    files = output_files(output or Path((scene.stem or "scene") + ".exr"))
     set_variant(variant)
 
     with stdout_to_stderr():

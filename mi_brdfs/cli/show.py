@@ -40,7 +40,7 @@ def show(
     if stage not in STAGES:
         fail(f"--stage {stage}: there is no such stage; there are {', '.join(STAGES)}", Exit.USAGE)
     name = "bsdf" if material.startswith("<") else re.sub(r"[^\w-]+", "_", Path(material).name.replace(".xml", ""))
-    files = output_files(output or Path(f"{name[:100]}.exr"))
+    files = output_files(output or Path(f"{name[:100] or 'bsdf'}.exr"))
     set_variant(variant)
 
     def load() -> tuple[mi.Scene, int]:

@@ -318,8 +318,8 @@ def _views(
             shape = (height, width, channels)
             raise FitError(f"A picture has the shape {pixels.shape}, and the film of its sensor has {shape}.")
         pixels = pixels[..., :colours]
-        if not np.nan_to_num(pixels, posinf=0).any():
-            raise FitError("A picture is black, or has no numbers.")
+        if not ((pixels > 0) & (pixels < np.inf)).any():
+            raise FitError("A picture is black, or has no positive numbers.")
         views.append(View(sensor, pixels))
     return views
 

@@ -49,7 +49,7 @@ ACROSS = 3
 
 
 def gallery(
-    types: Iterable[str] = (),
+    types: str | Iterable[str] = (),
     folder: str | os.PathLike = "gallery",
     spp: int = SPP,
     size: int = SIZE,
@@ -60,7 +60,7 @@ def gallery(
     them, with an overview and a contact sheet of each model. Ctrl-C keeps the finished pictures, and is raised.
 
     Args:
-        types: the models, by type or alias; all if empty.
+        types: a model, by type or alias, or several; all if empty.
         folder: where ``index.html``, ``overview.png`` and ``TYPE.png`` go; created if it does not exist.
         spp: samples per pixel, rounded up to a power of 4; the pictures are denoised.
         size: width and height of a picture, in pixels.
@@ -71,9 +71,11 @@ def gallery(
         The path of the page.
 
     Raises:
-        ValueError: if there is no such model; the message has the closest name.
+        ValueError: if there is no such model, with the closest name, or spp or size is too small.
         OSError: if the folder cannot be created or written to.
     """
+    if spp < 1 or size < 16:
+        raise ValueError(f"A gallery needs spp >= 1 and size >= 16, not {spp} and {size}.")
     entries = [Entry(model, with_presets) for model in by_family(find_models(types))]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

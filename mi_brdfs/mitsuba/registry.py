@@ -212,9 +212,10 @@ def own_models() -> list[type[Model]]:
     return [model for model in all_models() if is_own(model)]
 
 
-def find_models(names: Iterable[str] | None) -> list[type[Model]]:
-    """Return the models of some plugin names, each once, or all if there are none; raise as :func:`find_model`."""
-    return list(dict.fromkeys(map(find_model, names or []))) or all_models()
+def find_models(names: str | Iterable[str] | None) -> list[type[Model]]:
+    """Return the models of one plugin name or some, each once, or all if there are none; raise as
+    :func:`find_model`."""
+    return list(dict.fromkeys(map(find_model, [names] if isinstance(names, str) else names or []))) or all_models()
 
 
 def find_model(name: str) -> type[Model]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
@@ -63,8 +62,6 @@ def options_of(kind: str, angles: str | None, **options: Any) -> dict[str, Any]:
         numbers = None if angles is None else degrees_of(angles)
     except ValueError as error:
         raise ValueError(f"--angles {error}") from None
-    if not math.isfinite(azimuth := options.get("azimuth") or 0):
-        raise ValueError(f"--azimuth {azimuth}: give degrees")
     options = {"angles": numbers, **options}
     taken = inspect.signature(KINDS[kind]).parameters
     options = {name: value for name, value in options.items() if value is not None}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,6 +45,12 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
     return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
+
+
+def check_azimuth(azimuth: float) -> None:
+    """Raise a ValueError if an azimuth is no number of degrees."""
+    if not math.isfinite(azimuth):
+        raise ValueError(f"azimuth {azimuth}: give degrees")
 
 
 def with_smooth_part(found: list[Named]) -> list[Named]:

@@ -20,7 +20,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, largest
 from . import style
-from .given import Legend, by_channel, named, places, quantity, with_smooth_part
+from .given import Legend, by_channel, check_azimuth, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, WIDTH, incidence, look
 
 WI = {"marker": "o", "fillstyle": "none", "markersize": 6, "markeredgewidth": 1.1}
@@ -49,6 +49,9 @@ def hemisphere(
     :func:`polar`.
     """
     angles = angles_of_incidence(angles)
+    check_azimuth(azimuth)
+    if resolution not in range(2, 4097):
+        raise ValueError(f"resolution {resolution}: give from 2 to 4096 pixels")
     found = with_smooth_part(named(bsdfs, labels))
     rows = [(it, half) for it in found for half in ((1, -1) if lobes.transmits(it.probe) else (1,))]
     pictures = [[lobes.disc(it.probe, theta, azimuth, half, resolution) for theta in angles] for it, half in rows]
@@ -90,6 +93,7 @@ def albedo(
     reflected and transmitted light, delta functions included. It is the mean weight of 8192 samples of the BSDF's own
     sampler, with the same variates at each angle. A curve that grows without bound beyond 85° leaves the axes; how far
     it goes is above them. Everything else is as in :func:`polar`."""
+    check_azimuth(azimuth)
     found = named(bsdfs, labels)
     figure = style.new_figure(6, 3.8, size)
     if title:

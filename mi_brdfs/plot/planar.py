@@ -19,7 +19,7 @@ from ..given import angles_of_incidence
 from ..probe import curves as lobes
 from ..probe.curves import Curve, decades, largest
 from . import style
-from .given import Legend, Named, by_channel, named, places, quantity, with_smooth_part
+from .given import Legend, Named, by_channel, check_azimuth, named, places, quantity, with_smooth_part
 from .style import FAINT, GRID, INK, LETTERS, QUANTITY, SMALL, TEXT, UNBROKEN, WIDTH, Place, incidence, look
 
 SCALES = {"linear": ("linear",), "log": ("log",), "both": ("linear", "log")}
@@ -119,6 +119,7 @@ def _planar(
     """Draw a row of panels for the BSDF or for each angle, and a column for each scale; side by side, a column for each
     BSDF and a row for each scale. ``heights`` are those of a panel of width 1, without and with transmission."""
     angles = angles_of_incidence(angles)
+    check_azimuth(azimuth)
     if scale not in SCALES:
         raise ValueError(f"there is no scale {scale!r}; there are {', '.join(SCALES)}")
     scales = SCALES[scale]
