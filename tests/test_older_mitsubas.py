@@ -1,9 +1,8 @@
-"""Mitsubas before the one that is installed, each in an environment of its own."""
+"""Mitsubas before the one that is installed."""
 
 import os
 import subprocess
 import sys
-import sysconfig
 from pathlib import Path
 
 import pytest
@@ -24,28 +23,32 @@ WHAT = (
 
 @pytest.fixture(scope="module", params=["3.7.1", "3.8.0"])
 def older(request, tmp_path_factory):
-    """A Python that has an older Mitsuba, and else what this one has."""
+    """The environment variables with which this Python finds an older Mitsuba first."""
     folder = tmp_path_factory.mktemp("mitsuba")
-    subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
-    command = [python, "-m", "pip", "install", "--quiet", f"mitsuba=={request.param}"]
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", folder, f"mitsuba=={request.param}"]
     installed = subprocess.run(command, capture_output=True, text=True)
     if installed.returncode:
         pytest.skip(f"Mitsuba {request.param} cannot be installed: {installed.stderr.strip().splitlines()[-1]}")
-    where = [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
-    packages = Path(subprocess.run(where, capture_output=True, text=True, check=True).stdout.strip())
-    # Come after the environment's own, so that its Mitsuba and Dr.Jit are found first.
-    (packages / "others.pth").write_text(f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})\n")
-    version = subprocess.run(
-        [python, "-c", "import mitsuba; print(mitsuba.__version__)"], capture_output=True, text=True
-    )
+    found = os.environ | {"PYTHONPATH": str(folder)}
+    command = [sys.executable, "-c", "import mitsuba; print(mitsuba.__version__)"]
+    version = subprocess.run(command, capture_output=True, text=True, env=found)
     assert version.stdout.strip() == request.param, version.stderr
-    return python
+    return found
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(llvm.extra_library() is None, reason="the llvm extra is not installed")
 def test_models_are_the_same(older):
-    command = [older, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *(f"{TESTS}/{what}" for what in WHAT)]
-    run = subprocess.run(command, cwd=TESTS.parent, capture_output=True, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+        *(f"{TESTS}/{what}" for what in WHAT),
+    ]
+    run = subprocess.run(command, cwd=TESTS.parent, capture_output=True, text=True, env=older)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-1000:]

@@ -320,13 +320,11 @@ def test_a_dict_is_checked_where_no_variant_is_active():
 RIGHT = {
     "lambert": {"type": "lambert"},
     "phong sharp": {"type": "phong", "exponent": 300.0, **TWO},
-    "ward anisotropic": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3},
-    "walter": {"type": "walter", "alpha": 0.3, **TWO},
     "burley": {"type": "burley", "clearcoat": 0.5, "sheen": 0.5},
     "transmission": {"type": "wrap", "domain": "sphere", "wrap": 0.8, "exponent": 1.5},
     "roughconductor sharp": {"type": "roughconductor", "alpha": 1e-3},
-    "twosided": {"type": "twosided", "inner": {"type": "ward"}},
-    "textured": {"type": "ward", "specular_reflectance": {"type": "checkerboard"}},
+    "twosided": {"type": "twosided", "inner": {"type": "ward", "alpha_u": 0.1, "alpha_v": 0.3}},
+    "textured": {"type": "walter", "alpha": 0.3, **TWO, "specular_reflectance": {"type": "checkerboard"}},
 }
 
 
