@@ -27,3 +27,10 @@ def last_breath(folder, deaths):
         open(os.path.join(folder, str(died)), "w").close()
         os.kill(os.getpid(), 9)
     return "alive"
+
+
+def ends_at_three(number):
+    """Return what is given; of 3 the process ends."""
+    if number == 3:
+        os._exit(3)
+    return number

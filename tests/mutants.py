@@ -345,6 +345,12 @@ def drawn_otherwise_from_lights(own, self, ctx, si, u, v, active):
     return weighed_anew(self, ctx, si, bs, active)
 
 
+def sampled_brighter_from_lights(own, self, ctx, *given):
+    """eval_pdf_sample alone returns more than eval."""
+    value, *rest = own(self, ctx, *given)
+    return value * brighter_from_lights(ctx, None, None), *rest
+
+
 def exchanged(value):
     return mi.Color3f(value.z, value.y, value.x) if mi.is_rgb else value
 
@@ -855,6 +861,7 @@ MUTANTS = [
     mutant("eval_pdf at a fixed point", "textures", Lambert, adapted(eval_pdf=at_a_fixed_point, **ALONE)),
     mutant("eval_pdf in the world", "calls", Lambert, evaluated(in_the_world, **ALONE)),
     mutant("eval_pdf in one mode", "mode", Lambert, evaluated(brighter_from_lights, **ALONE)),
+    mutant("eval_pdf_sample in one mode", "mode", Lambert, adapted(eval_pdf_sample=sampled_brighter_from_lights)),
     mutant("eval_pdf_sample without derivatives", "gradients", Lambert, adapted(eval_pdf_sample=suspended)),
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
@@ -982,6 +989,7 @@ MUTANTS = [
         elsewhere(lambda uv: mi.Point2f(0)),
         reflectance={"type": "checkerboard"},
     ),
+    mutant("eval_pdf_sample at a fixed point", "textures", Ward, adapted(eval_pdf_sample=at_a_fixed_point), alpha=0.3),
     mutant("half a texel off", "textures", elsewhere(lambda uv: mi.Point2f(uv.x + 0.5 / 3, uv.y))),
     mutant(
         "reflectance at a fixed point",

@@ -19,7 +19,7 @@ import mitsuba as mi
 import numpy as np
 import psutil
 import pytest
-from cluster_tasks import last_breath, powers, work
+from cluster_tasks import ends_at_three, last_breath, powers, work
 from support import LOFT, ROOT
 from test_cli import invoke
 
@@ -147,6 +147,15 @@ def test_ctrl_c_waits_until_dask_is_imported(monkeypatch):
 def test_a_task_of_which_workers_die_is_given_out_again(tmp_path):
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         assert list(run(last_breath, {"a": (str(tmp_path), 1)}, workers=1)) == [("a", "alive")]
+
+
+@pytest.mark.slow
+def test_what_a_worker_has_finished_before_it_dies_is_computed_again(monkeypatch):
+    """The worker of all others ends with one task, by whose status nobody takes it for one that could not start."""
+    monkeypatch.setattr(client, "ROUNDS", 2)
+    results = dict(run(ends_at_three, {str(number): (number,) for number in range(6)}, workers=1))
+    assert results.pop("3") == Failed("each worker that had this task died")
+    assert results == {str(number): number for number in (0, 1, 2, 4, 5)}
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """Derivatives of weights, values and pictures, against finite differences."""
 
+from functools import partial
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -165,6 +167,25 @@ def test_a_limited_roughness_takes_nothing_from_the_other(sign):
     for key, gradient in gradients_of(params, keys, loss).items():
         (expected,) = differences(params, key, [0], 3e-4, lambda: loss().numpy().item())
         assert gradient.item() == pytest.approx(expected, rel=0.01), key
+
+
+def test_one_of_several_factors_at_their_ends_goes_inwards():
+    """Lafortune's Cmax is that of the others then."""
+    given = {"cx": -1.5, "cy": -1.5, "cz": 1.5}
+    si, wo = interaction(hemisphere(1000, 1)), mi.Vector3f(hemisphere(1000, 2).T)
+
+    def total(bsdf):
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, wo, True)[0])
+
+    for name, limit in given.items():
+        bsdf = mi.load_dict({"type": "lafortune", "exponent": 20, **given})
+        params, key = mi.traverse(bsdf), f"{name}.value"
+        (gradient,) = gradients_of(params, [key], partial(total, bsdf)).values()
+        at = total(bsdf).numpy().item()
+        params[key] = 0.999 * limit
+        params.update()
+        expected = (at - total(bsdf).numpy().item()) / (0.001 * limit)
+        assert gradient.item() == pytest.approx(expected, rel=0.05), name
 
 
 # --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------

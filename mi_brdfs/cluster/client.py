@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import queue
@@ -11,6 +12,7 @@ import time
 import uuid
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import wait
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -112,6 +114,8 @@ class _Run:
                 continue
             key, arguments, rounds = self.pending.pop(future)
             result = self._result(future)
+            if self.processes:
+                self.processes.failures = 0
             if not isinstance(result, KilledWorker):
                 yield key, result
             elif rounds < ROUNDS:
@@ -139,12 +143,25 @@ class _Run:
         try:
             error = future.exception()
             if error is None:
-                return future.result()
+                return self._fetched(future)
+        except KilledWorker as killed:
+            return killed
         except (CancelledError, OSError, TimeoutError):
             raise ClusterError(_gone(self.client)) from None
         if isinstance(error, KilledWorker):
             return error
         raise ClusterError(_gone(self.client) if isinstance(error, CancelledError) else _of_worker(error))
+
+    def _fetched(self, future: Future) -> Any:
+        """Return the result, which is computed again if its worker has died since: that needs one that lives."""
+        loop = self.client.loop.asyncio_loop  # type: ignore[union-attr]
+        coming = asyncio.run_coroutine_threadsafe(self.client.gather(future, asynchronous=True), loop)
+        try:
+            while not wait([coming], LOOKING).done:
+                self._look_after_workers()
+            return coming.result()
+        finally:
+            coming.cancel()
 
     def _worker_count(self) -> int:
         """Return the number of workers, asked for now and then."""
@@ -163,7 +180,7 @@ class _Run:
         self._worker_count()  # or the scheduler is silent
         if self.processes:
             self.processes.start()
-            if self.processes.failures > 3 * len(self.processes.running):
+            if self.processes.failures > 5 * len(self.processes.running):
                 raise ClusterError(f"The worker processes fail: {self.processes.last_words()}")
 
 
@@ -184,7 +201,7 @@ class _Processes:
         self.environment = os.environ | {"PYTHONPATH": path, "DASK_LOGGING__DISTRIBUTED": "error"}
         self.running: list[subprocess.Popen | None] = [None] * count
         self.failures = 0
-        """How often one ended with an error, and not by a signal."""
+        """How often one ended with an error, and not by a signal, since a task ended."""
 
     def start(self) -> None:
         """Start those that do not run."""

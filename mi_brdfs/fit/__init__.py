@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -106,8 +107,11 @@ def fit(
     sources: list[Any] = list(data) if several else [data]  # type: ignore[arg-type]
     if not sources:
         raise FitError("There are no data to fit.")
-    if starts < 0 or lobes < 1 or pairs < 2 or seed < 0 or not 0 < cut <= 90:
-        raise FitError("A fit needs starts >= 0, lobes >= 1, pairs >= 2, seed >= 0 and a cut in (0, 90] degrees.")
+    whole = all(isinstance(it, Integral) for it in (starts, lobes, pairs, seed))
+    if not whole or starts < 0 or lobes < 1 or pairs < 2 or seed < 0 or not 0 < cut <= 90:
+        raise FitError(
+            "A fit needs whole numbers starts >= 0, lobes >= 1, pairs >= 2, seed >= 0 and a cut in (0, 90] degrees."
+        )
     models = [find_model(name) for name in ([model] if isinstance(model, str) else model)]
     if not models:
         raise FitError("There is no model to fit; name one or more.")

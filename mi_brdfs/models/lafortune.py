@@ -9,6 +9,9 @@ from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p, log1p_series, s
 from ..model import Model, Values
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
+FARTHEST = 1.5
+"""The largest |C|."""
+
 
 class Lafortune(Model):
     """Lafortune, Foo, Torrance and Greenberg's generalised cosine lobes (1997).
@@ -47,9 +50,9 @@ class Lafortune(Model):
     specular = PerLobe(
         8,
         specular_reflectance=Reflectance(0.2, "scale ρ of lobe i", role="specular"),
-        cx=Number(-1, (-1.5, 1.5), "factor Cx of lobe i"),
-        cy=Number(-1, (-1.5, 1.5), "factor Cy of lobe i", isotropic_as="cx"),
-        cz=Number(1, (-1.5, 1.5), "factor Cz of lobe i"),
+        cx=Number(-1, (-FARTHEST, FARTHEST), "factor Cx of lobe i"),
+        cy=Number(-1, (-FARTHEST, FARTHEST), "factor Cy of lobe i", isotropic_as="cx"),
+        cz=Number(1, (-FARTHEST, FARTHEST), "factor Cz of lobe i"),
         exponent=Number(30, (0, 1e6), "exponent n of lobe i"),
     )
     normalization = Choice(("energy", "none"), "scale of the lobes")
@@ -60,11 +63,17 @@ class Lafortune(Model):
         glossy = []
         for lobe in p.specular:
             n, c = lobe.exponent, (lobe.cx, lobe.cy, lobe.cz)
-            # The 1e-6 is for factors that are all zero.
-            largest = dr.maximum(dr.maximum(abs(c[0]), abs(c[1])), dr.maximum(abs(c[2]), 1e-6)) if energy else 1
+            largest = self._largest(*map(abs, c)) if energy else 1
             scale = (n + 2) * dr.inv_two_pi if energy else 1
             glossy.append(LafortuneLobe(lobe.specular_reflectance, n, scale, c, largest))
         return LambertLobe(p.diffuse_reflectance), *glossy
+
+    @staticmethod
+    def _largest(x: mi.Float, y: mi.Float, z: mi.Float) -> mi.Float:
+        """Return Cmax. Where several are at the ends of their ranges, one that goes inwards does not change it."""
+        largest = dr.maximum(dr.maximum(x, y), dr.maximum(z, 1e-6))  # for factors that are all zero
+        at_ends = sum(dr.select(c >= FARTHEST, 1, 0) for c in (x, y, z))
+        return dr.select(at_ends > 1, dr.detach(largest), largest)
 
 
 class LafortuneLobe(PowerLobe):

@@ -14,6 +14,7 @@ from ..mitsuba.registry import plugin_names
 from ..probe.sources import degrees_of, shared, split, value_of
 from ..writing import replacing
 from . import albedo, cartesian, hemisphere, polar
+from .style import checked_size
 
 KINDS: dict[str, Callable] = {each.__name__: each for each in (polar, cartesian, hemisphere, albedo)}
 """The functions by the value of ``--kind``."""
@@ -76,12 +77,9 @@ def size_of(text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
     try:
-        width, height = map(float, text.split("x"))
+        return checked_size([float(side) for side in text.split("x")])
     except ValueError:
-        width = height = 0
-    if not (1 <= width <= 50 and 1 <= height <= 50):
-        raise ValueError(f"--size {text}: write WIDTHxHEIGHT, in inches from 1 to 50, as in 6x4")
-    return width, height
+        raise ValueError(f"--size {text}: write WIDTHxHEIGHT, in inches from 1 to 50, as in 6x4") from None
 
 
 def default_file(kind: str, targets: Sequence[str]) -> Path:

@@ -28,7 +28,7 @@ class Named(NamedTuple):
     probe: BSDFProbe
 
 
-def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -> list[Named]:
+def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: str | Sequence[object] | None) -> list[Named]:
     """Return the BSDFs loaded, with the labels given or found. Raise a ValueError if there are none, one is not a BSDF,
     or the active variant cannot evaluate arrays of directions."""
     if not is_measurable(mi.variant()):
@@ -40,9 +40,10 @@ def named(bsdfs: Sequence[str | dict | mi.BSDF], labels: Sequence[str] | None) -
         raise ValueError('there is no BSDF to plot; give one, such as {"type": "ward"}')
     found = [pair for given, label in zip(bsdfs, Legend(bsdfs).labels(), strict=True) for pair in _loaded(given, label)]
     if labels is not None:
-        if len(labels) != len(found):
-            raise ValueError(f"there are {len(found)} BSDFs, but {len(labels)} labels")
-        found = [(label, probe) for label, (_, probe) in zip(labels, found, strict=True)]
+        words = [labels] if isinstance(labels, str) else [str(label) for label in labels]
+        if len(words) != len(found):
+            raise ValueError(f"there are {len(found)} BSDFs, but {len(words)} labels")
+        found = [(word, probe) for word, (_, probe) in zip(words, found, strict=True)]
     # Legends leave out labels that begin with an underscore.
     return [Named(plain(label.lstrip("_")), probe) for label, probe in found]
 
@@ -194,6 +195,7 @@ def _told(word: str, parameters: dict[str, str]) -> str:
 
 def _loaded(given: Any, label: str) -> Iterator[tuple[str, BSDFProbe]]:
     """Yield what a user gave, loaded, with its label or name: for a measured file, its title."""
+    given = str(given) if isinstance(given, Path) else given
     found = ((it.name, it.load()) for it in sources_of(given)) if isinstance(given, str) else [("", given)]
     for name, loaded in found:
         file = measured_file(loaded) if isinstance(loaded, dict) else None

@@ -47,9 +47,17 @@ class _Figure(Figure):
         return png.getvalue(), {"width": round(width), "height": round(height)}
 
 
+def checked_size(size: Sequence[float]) -> tuple[float, float]:
+    """Return a width and a height in inches, or raise a ValueError."""
+    if np.shape(size) != (2,) or not all(1 <= side <= 50 for side in size):
+        raise ValueError(f"size {size}: give a width and a height in inches, from 1 to 50, as in (6, 4)")
+    return size[0], size[1]
+
+
 def new_figure(width: float, height: float, size: tuple[float, float] | None = None) -> _Figure:
-    """Return a figure of a width and a height in inches, or of the size that is asked for."""
-    width, height = size or (width, height)
+    """Return a figure of a width and a height in inches, or of the size that is asked for. Raise a ValueError if that
+    is none."""
+    width, height = checked_size(size) if size else (width, height)
     figure = _Figure(figsize=(width, height), dpi=144, layout="constrained", facecolor="white")
     figure.is_sized = size is not None
     figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.08 / height))  # titles otherwise touch the edge
@@ -67,7 +75,7 @@ def calm(ax: Axes) -> None:
 
 def plain(text: str) -> str:
     """Return a text of the user's, in which Matplotlib is to see no formulas and SVG no control characters."""
-    return printable(text).replace("$", r"\$")
+    return printable(str(text)).replace("$", r"\$")
 
 
 def set_title(figure: Figure, text: str) -> None:

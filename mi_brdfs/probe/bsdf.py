@@ -222,10 +222,12 @@ class BSDFProbe:
         value, pdf = self.bsdf.eval_pdf(part.context, self._at(wi, uv, len(wo)), vectors(wo), True)
         return numbers(value, len(wo)), numbers(pdf, len(wo))[:, 0]
 
-    def eval_pdf_sample(self, part: Part, wi: Array, wo: Array, variates: Array) -> tuple[Array, ...]:
+    def eval_pdf_sample(
+        self, part: Part, wi: Array, wo: Array, variates: Array, uv: ArrayLike = CENTRE
+    ) -> tuple[Array, ...]:
         """Return ``(value, pdf, wo, density, weight)``, the last three of the sample."""
         u, v = sample_arguments(variates)
-        count, si = len(variates), self._at(wi, CENTRE, len(variates))
+        count, si = len(variates), self._at(wi, uv, len(variates))
         value, pdf, bs, weight = self.bsdf.eval_pdf_sample(part.context, si, vectors(wo), u, v, True)
         value, pdf, sampled, density, weight = (numbers(x, count) for x in (value, pdf, bs.wo, bs.pdf, weight))
         return value, pdf[:, 0], sampled, density[:, 0], weight

@@ -22,6 +22,7 @@ from .deltas import deltas
 from .outcome import KNOWN, Outcome, Skipped, skipping, told
 from .run import Run, of_each, of_whole
 from .traced import gradient, traced_floats
+from .values import compare_joint, eval_pdf
 
 COUNT = 2000
 EVALUATED = "eval", "pdf", "eval_pdf"
@@ -121,9 +122,9 @@ def mode(run: Run, part: Part, outcome: Outcome) -> str:
     transmitted where both sides are seen, is what it is the other way, f with its directions exchanged, times the
     cosine of ``wo``: Mitsuba's ``eval`` and ``sample`` are those of the adjoint then, without which ``ptracer`` and
     ``path`` give different pictures. That is the same unless the component is flagged NonSymmetric; the flag alone does
-    not do. And the weight of ``sample`` is ``eval``/``pdf`` in this mode, too, and if the two modes are the same, it
-    carries as much light to the same directions. Delta functions draw the same, and weigh it without the factor 1/η² of
-    refracted radiance."""
+    not do. And in this mode, too, the weight of ``sample`` is ``eval``/``pdf``, ``eval_pdf`` and ``eval_pdf_sample``
+    say what the others do, and if the two modes are the same, samples carry as much light to the same directions. Delta
+    functions draw the same, and weigh it without the factor 1/η² of refracted radiance."""
     traced = part._replace(context=context(part.component))
     traced.context.mode = mi.TransportMode.Importance
     if part not in run.probe.deltas:
@@ -149,10 +150,13 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
         name = "in the mode Importance eval"
         # What grazing facets transmit is faint and has few digits.
         outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
-        name, value = "in the mode Importance eval_pdf's value", run.probe.eval_pdf(traced, wi, wo)[0]
-        outcome.differing(tolerance, name, value, got, "by eval", wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
-        samples = run.probe.sample(traced, wi, random(COUNT, 67))
-        # What is wrong with a weight in any mode is said once.
+        samples = run.probe.sample(traced, wi, u := random(COUNT, 67))
+        # What is wrong in any mode is said once.
+        if not sampling.failing(run, part, eval_pdf):
+            compare_joint(
+                run.probe, traced, outcome, tolerance, wi, wo, u, samples,
+                when="in the mode Importance ", floor=1e-3, unknown=0, but_for=1e-3, seed=67,
+            )  # fmt: skip
         if not sampling.failing(run, part, sampling.weight):
             name, reflected = "in the mode Importance a weight times pdf", samples.weight * samples.pdf[:, None]
             pair, lit = (reflected, samples.value), samples.lit
@@ -161,8 +165,7 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
             )
         # Delta functions, which need not be symmetric, are looked at by themselves.
         own, usual = (
-            it._replace(weight=it.weight * it.smooth[:, None])
-            for it in (samples, run.probe.sample(part, wi, random(COUNT, 67)))
+            it._replace(weight=it.weight * it.smooth[:, None]) for it in (samples, run.probe.sample(part, wi, u))
         )
         if symmetric and (error := sampling.strays(own, usual, wi)):
             told = "samples carry other light, or to other directions, than in the other"

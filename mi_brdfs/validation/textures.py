@@ -17,6 +17,7 @@ from .outcome import Findings, Outcome, Skipped, relative
 from .report import Finding
 from .run import Run
 from .updates import loaded_or_none
+from .values import compare_joint, eval_pdf
 
 COUNT = 4000
 SHAPE = 5, 7
@@ -28,8 +29,8 @@ def textures(run: Run) -> Findings:
     outside the unit square. Constant parameters become bitmaps of random texels, and given textures stay. All over them
     ``eval``, ``eval_diffuse_reflectance`` and the weights of delta functions are what they are where each texture has
     the value of the point everywhere, and no other than if fewer points are evaluated; weights are eval/pdf, to
-    float32's rounding; and samples carry as much light to the same directions, to six standard errors. For this the
-    BSDF must be given as a dict."""
+    float32's rounding; ``eval_pdf`` and ``eval_pdf_sample`` say what the others do; and samples carry as much light to
+    the same directions, to six standard errors. For this the BSDF must be given as a dict."""
     varied, refused = _textured(run.probe, run.described("To replace its parameters by textures"))
     for name in refused:
         yield Finding("textures", name, "skip", "It does not take a bitmap of its kind beside the others.")
@@ -72,6 +73,8 @@ def _compare(run: Run, outcome: Outcome, varied: dict[str, mi.Texture], free: Co
     if np.quantile(error, 0.999) <= tolerance:  # else it is no matter of textures
         reflected, value = _reflected(samples)
         rows.append((Value("the weight times pdf", wo, reflected), value, "is eval"))
+    if not sampling.failing(run, part, eval_pdf):
+        compare_joint(real, part, outcome, tolerance, wi, wo, u, samples, uv=uv, seed=31)
     for it, expected, why in rows:
         outcome.differing(tolerance, it.name, it.value, expected, why, wi, it.wo, uv=uv)
     if astray := sampling.strays(samples, other.sample(part, wi, u, uv), wi):

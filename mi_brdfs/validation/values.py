@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache, partial
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from ..probe.arrays import Array
-from ..probe.bsdf import Part
+from ..probe.bsdf import CENTRE, BSDFProbe, Part, Samples
 from ..probe.directions import direction, hemisphere, on_side
 from ..probe.variates import random
 from .incidents import SCATTERED
@@ -145,22 +146,43 @@ def eval_pdf(run: Run, part: Part, outcome: Outcome) -> str:
         samples = run.probe.sample(part, wi, u)
         wo = np.where(np.arange(len(u))[:, None] % 2, samples.wo, hemisphere(len(u), 7)).astype(np.float32)
         wo[::4, 2] *= -1  # where nothing is, the sample must still be drawn
-        value, density = run.probe.eval(part, wi, wo), run.probe.pdf(part, wi, wo)
-        pair, triple = run.probe.eval_pdf(part, wi, wo), run.probe.eval_pdf_sample(part, wi, wo, u)
-        drawn = samples.drawn
-        for name, of, got, expected, which in (
-            ("eval_pdf", "eval", pair[0], value, None),
-            ("eval_pdf", "pdf", pair[1], density, None),
-            ("eval_pdf_sample", "eval", triple[0], value, None),
-            ("eval_pdf_sample", "pdf", triple[1], density, None),
-            ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
-            ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, None),
-            ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
-        ):
-            name = f"{of} of {name}"
-            error = outcome.differing(tolerance, name, got, expected, f"by {of}", wi, wo, where=which, seed=6, digits=6)
-            worst = max(worst, error)
+        worst = max(worst, compare_joint(run.probe, part, outcome, tolerance, wi, wo, u, samples, seed=6, digits=6))
     return f"eval_pdf and eval_pdf_sample agree with the others to {worst:.1g}."
+
+
+def compare_joint(
+    probe: BSDFProbe,
+    part: Part,
+    outcome: Outcome,
+    tolerance: float,
+    wi: Array,
+    wo: Array,
+    u: Array,
+    samples: Samples,
+    *,
+    when: str = "",
+    uv: Array | None = None,
+    **how: Any,
+) -> float:
+    """Compare what ``eval_pdf`` and ``eval_pdf_sample`` say with ``eval``, ``pdf`` and the samples of the variates
+    ``u``, at the centre of textures or at ``uv``, as :meth:`.Outcome.differing` does; return the largest error."""
+    at, drawn = CENTRE if uv is None else uv, samples.drawn
+    value, density = probe.eval(part, wi, wo, at), probe.pdf(part, wi, wo, at)
+    pair, triple = probe.eval_pdf(part, wi, wo, at), probe.eval_pdf_sample(part, wi, wo, u, at)
+    rows = (
+        ("eval_pdf", "eval", pair[0], value, None),
+        ("eval_pdf", "pdf", pair[1], density, None),
+        ("eval_pdf_sample", "eval", triple[0], value, None),
+        ("eval_pdf_sample", "pdf", triple[1], density, None),
+        ("eval_pdf_sample", "sample's density", triple[3], samples.density, drawn),
+        ("eval_pdf_sample", "sample's weight", triple[4], samples.weight, None),
+        ("eval_pdf_sample", "sample's direction", triple[2] + 2.0, samples.wo + 2.0, drawn),
+    )
+    errors = []
+    for name, of, got, expected, which in rows:
+        name = f"{when}{of} of {name}"
+        errors.append(outcome.differing(tolerance, name, got, expected, f"by {of}", wi, wo, where=which, uv=uv, **how))
+    return max(errors)
 
 
 @of_parts
