@@ -515,6 +515,13 @@ def tiled_in_place(own, self, ctx, si, *given):
     return own(self, ctx, si, *given)
 
 
+def turned_to_the_front(own, self, ctx, si, *given):
+    """What comes from behind gets no light, but is from the front afterwards."""
+    value = own(self, ctx, si, *given)
+    si.wi.z = abs(si.wi.z)
+    return value
+
+
 ALONE = {
     "eval": with_derivatives,
     "pdf": lambda own, self, *given: adapter.ModelBSDF.eval_pdf(self, *given)[1],
@@ -864,6 +871,7 @@ MUTANTS = [
     mutant("eval_pdf_sample in one mode", "mode", Lambert, adapted(eval_pdf_sample=sampled_brighter_from_lights)),
     mutant("eval_pdf_sample without derivatives", "gradients", Lambert, adapted(eval_pdf_sample=suspended)),
     mutant("texture coordinates changed", "calls", Lambert, adapted(sample=tiled_in_place)),
+    mutant("turned to the front", "calls", Lambert, adapted(eval=turned_to_the_front)),
     mutant("text of what there is not", "calls", Lambert, adapted(to_string=lambda own, self: self.title)),
     mutant("colours of wavelengths beside", "spectral", colour(beside)),
     mutant("direction lifted in place", "calls", Lambert, adapted(eval=lifted)),

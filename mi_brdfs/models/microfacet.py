@@ -97,10 +97,11 @@ class Microfacet(Model):
     by itself. Beyond that facets may be up to 0.07 too dark or 0.06 too bright. Where neither α exceeds 1, the albedo
     of walk is up to 4 : 1 that of the simulated walk up to 60° (and at 80°) within 0.005 (0.015) for Schlick's
     reflectance with an exponent of 5 or more and an f82 of 0.5 or more, and for dielectrics and metals (0.007 where
-    η < 1 <= k, 0.055 where both are less); within 0.025 (0.03) for smaller exponents and f82, and for films in rgb; and
+    η < 1 <= k, 0.055 where both are less); within 0.03 for smaller exponents and f82, and for films in rgb; and
     within 0.14 (0.075 where αu = αv) where light is reflected totally, for ``int_ior`` < ``ext_ior``. At 8 : 1 that of
     metals is within 0.006 (0.01). Where one α reaches 2, up to 4 : 1 and 80°, that of all these is within 0.035, but
-    0.08 for metals with η and k below 1, and 0.17 where light is reflected totally.
+    0.09 for metals with η and k below 1 and for smaller exponents with f90 < f0, and 0.17 where light is reflected
+    totally.
 
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``

@@ -87,6 +87,8 @@ def find_sources(word: str, parameters: Mapping[str, str] | None = None) -> Iter
         Exception: what Mitsuba raises where it cannot be loaded.
     """
     word, own = split(word)
+    if not word:
+        raise ValueError("the name of a material is empty: give a plugin, a preset or a file")
     parameters = {**(parameters or {}), **own}
     if not (is_data := is_measured(word)):
         check_name(word)

@@ -270,6 +270,7 @@ def calls(run: Run, part: Part, outcome: Outcome) -> str:
 
 def _check_arguments(run: Run, outcome: Outcome, wi: Array, wo: Array, u: Array) -> None:
     """Check that methods leave their arguments as they are, also directions on the other side."""
+    wi = wi * np.where(np.arange(COUNT)[:, None] % 5, 1, np.array([1, 1, -1])).astype(np.float32)
     wo = wo * np.where(np.arange(COUNT)[:, None] % 3, 1, np.array([1, 1, -1])).astype(np.float32)
     ctx, si, towards, variates = context(), interaction(wi), vectors(wo), sample_arguments(u)
 
