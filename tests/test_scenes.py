@@ -50,10 +50,11 @@ def test_picture_shows_the_scene(path, rendered, side, limit):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm_rgb")
-def test_the_first_picture_is_what_its_command_renders():
-    """Almost nothing in it is black or clipped."""
+def test_the_first_picture_is_what_its_command_renders(monkeypatch):
+    """A quarter of the samples does, as they are denoised. Almost nothing in it is black or clipped."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert f"mi-brdfs render scenes/first_light.xml --spp {scenes.FIRST_LIGHT_SPP} --denoise\n" in readme
+    monkeypatch.setattr(scenes, "FIRST_LIGHT_SPP", scenes.FIRST_LIGHT_SPP // 4)
     stored = np.array(mi.Bitmap(str(scenes.FIRST_LIGHT)), np.float64) / 255
     now = np.array(scenes.first_light(), np.float64) / 255
     assert stored.shape == now.shape and abs(squares(stored) - squares(now)).mean() < 0.005
