@@ -151,19 +151,9 @@ def eval_pdf(run: Run, part: Part, outcome: Outcome) -> str:
 
 
 def compare_joint(
-    probe: BSDFProbe,
-    part: Part,
-    outcome: Outcome,
-    tolerance: float,
-    wi: Array,
-    wo: Array,
-    u: Array,
-    samples: Samples,
-    *,
-    when: str = "",
-    uv: Array | None = None,
-    **how: Any,
-) -> float:
+    probe: BSDFProbe, part: Part, outcome: Outcome, tolerance: float, wi: Array, wo: Array, u: Array, samples: Samples,
+    *, when: str = "", uv: Array | None = None, **how: Any,
+) -> float:  # fmt: skip
     """Compare what ``eval_pdf`` and ``eval_pdf_sample`` say with ``eval``, ``pdf`` and the samples of the variates
     ``u``, at the centre of textures or at ``uv``, as :meth:`.Outcome.differing` does; return the largest error."""
     at, drawn = CENTRE if uv is None else uv, samples.drawn
