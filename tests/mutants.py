@@ -445,6 +445,12 @@ def asks_for_values(own, self, ctx, si, wo, active):
     return own(self, ctx, si, wo, active if dr.any(wo.z > 0) else False)
 
 
+def brighter_for_one_lane(own, self, ctx, si, wo, active):
+    """A shortcut that renderers take, whose calls are recorded for one lane."""
+    value, pdf = own(self, ctx, si, wo, active)
+    return value * (1.5 if dr.width(wo) == 1 else 1), pdf
+
+
 def follows_no_update(own, self, ctx, si, u, v, active):
     """sample draws as it did before its exponent was set."""
     now = self.textures["exponent"].eval_1(si)
@@ -1085,6 +1091,7 @@ MUTANTS = [
     mutant("sampled as before an update", "updates", Phong, adapted(sample=follows_no_update), **TWO, exponent=30.0),
     mutant("brightness of other lanes", "textures", colour(as_bright_as_others)),
     mutant("values asked for", "recorded", Ward, adapted(eval_pdf=asks_for_values)),
+    mutant("another value for one lane", "recorded", Ward, adapted(eval_pdf=brighter_for_one_lane)),
     mutant("flagged for both sides", "flags", Lambert, flagged(flagged_for_both_sides)),
     mutant("mode ignored", "mode", lambert(OneWayAndSaysSo), adapted(_mixture=ignored_mode)),
     mutant("drawn otherwise from lights", "mode", Ward, adapted(sample=drawn_otherwise_from_lights), alpha=0.3),

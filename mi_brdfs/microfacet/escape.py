@@ -86,10 +86,11 @@ class Walks:
     def __init__(self, smith: Smith, table: Any, uniform: Callable[[str, Any], Any]) -> None:
         u, v = smith.alpha_u, smith.alpha_v
         self.smith, self.isotropic = smith, u is v
-        largest = dr.maximum(u, v)
+        # Where both are the same, derivatives are those for a larger u, as of facets that are stretched along dp_du …
+        largest, smallest = dr.select(u < v, v, u), dr.select(u < v, u, v)
         at = [dr.sqrt((1 + 1 / ROUGHEST) * largest / (1 + largest))]
         if not self.isotropic:
-            at.append(dr.sqrt(dr.sqrt(dr.minimum(u, v) / largest)))
+            at.append((1 - 1e-6) * dr.sqrt(dr.sqrt(smallest / largest)))  # … and not 0, as beyond the last texel
         most, falling = BENDS[smith.facets][smith.correlated]
         bend = most * dr.rcp(1 + 0.5 * falling * (u * u + v * v))
         self.bend, self.inverse = uniform("bend", (bend, dr.rcp(u * v)))
