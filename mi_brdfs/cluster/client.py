@@ -98,15 +98,18 @@ class _Run:
 
     def results(self, tasks: Iterator[tuple[str, tuple]]) -> Iterator[tuple[str, Any]]:
         """Yield keys and results."""
-        left = True
+        left, suspects = True, list[tuple[str, tuple, int]]()
         while True:
-            while left and len(self.pending) < AHEAD * max(self._worker_count(), 1):
+            # Tasks wait behind others at workers, and share their fate: give those of dead ones out one by one.
+            while left and not suspects and len(self.pending) < AHEAD * max(self._worker_count(), 1):
                 task = next(tasks, None)
                 left = task is not None
                 if task:
                     self._submit(*task)
             if not self.pending:
-                return
+                if not suspects:
+                    return
+                self._submit(*suspects.pop(0))
             try:
                 future = self.ended.get(timeout=LOOKING)
             except queue.Empty:
@@ -119,7 +122,7 @@ class _Run:
             if not isinstance(result, KilledWorker):
                 yield key, result
             elif rounds < ROUNDS:
-                self._submit(key, arguments, rounds + 1)
+                suspects.append((key, arguments, rounds + 1))
             else:
                 yield key, Failed("each worker that had this task died")
 
