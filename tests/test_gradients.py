@@ -205,6 +205,14 @@ def test_where_both_roughnesses_are_the_same_derivatives_are_those_of_one_side(g
     assert gradient == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.parametrize("way", ["walk", "kulla-conty"])
+def test_what_facets_lose_knows_that_total_reflection_moves_with_the_index(way):
+    """Without that the derivative was less by a third."""
+    given = {"type": "walter", "alpha": 0.5, "int_ior": 1.2, "ext_ior": 1.7, "multiscatter": way}
+    gradient, expected = one_sided(given, "int_ior", 1e-3)
+    assert gradient == pytest.approx(expected, rel=0.05)
+
+
 # --- Derivatives of the BSDFs themselves ----------------------------------------------------------------------------
 
 

@@ -144,7 +144,7 @@ class Dielectric(Interface):
         return dr.select(total, dr.select(step < 0, 1, 0), 0.5 * s * (1 + p))
 
     def critical(self) -> mi.Float:
-        return dr.detach(safe_sqrt(1 - self.eta * self.eta))
+        return safe_sqrt(1 - self.eta * self.eta)
 
     brightness = __call__
 

@@ -141,7 +141,7 @@ class Fresnel(Term):
         return luminance(self(cos))
 
     def critical(self) -> Any:
-        """Return the cosine up to which all light is reflected, as a number without a derivative."""
+        """Return the cosine up to which all light is reflected."""
         return 0.0
 
     def combination(self) -> tuple[Spectrum, ...]:
