@@ -232,7 +232,7 @@ def test_a_checker_finds_nothing(given):
 
 
 def test_a_checker_finds_nothing_in_derivatives():
-    """Nor in what else has kernels of its own, which with one channel take a third as long to compile."""
+    """Nor in what else has kernels of its own, which compile faster with one channel."""
     film = {"film_thickness": 450.0, "film_ior": 1.33}
     checks = ["gradients", "active", "continuity", "textures", "updates", "recompiles", "mode"]
     with mi.variant_context("llvm_ad_mono"):

@@ -150,11 +150,8 @@ def test_limits_within_models_can_be_left(bsdf, key, theta):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_limited_roughness_takes_nothing_from_the_other(sign):
     """Burley's αv is held, αu is not: the derivative for what both depend on is a difference's, whichever the loss."""
-    bsdf, ctx = (
-        mi.load_dict({"type": "burley", "base_color": 0, "roughness": 0.04, "anisotropic": 0.9}),
-        mi.BSDFContext(),
-    )
-    params = mi.traverse(bsdf)
+    bsdf = mi.load_dict({"type": "burley", "base_color": 0, "roughness": 0.04, "anisotropic": 0.9})
+    params, ctx = mi.traverse(bsdf), mi.BSDFContext()
     wo = mi.Vector3f(unit([[-0.29, 0.02, 0.95], [-0.2, 0, 0.97]]).T)
     si = interaction(unit([0.3, 0, 0.95]))
 

@@ -39,16 +39,7 @@ def older(request, tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.skipif(llvm.extra_library() is None, reason="the llvm extra is not installed")
 def test_models_are_the_same(older):
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        *(f"{TESTS}/{what}" for what in WHAT),
-    ]
+    what = [f"{TESTS}/{it}" for it in WHAT]
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *what]
     run = subprocess.run(command, cwd=TESTS.parent, capture_output=True, text=True, env=older)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-1000:]

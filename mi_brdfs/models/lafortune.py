@@ -9,7 +9,7 @@ from ..math import EPSILON, SMALL, TINY, Spectrum, clamp, log1p, log1p_series, s
 from ..model import Model, Values
 from ..parameters import Choice, Number, PerLobe, Reflectance, Rotation
 
-FARTHEST = 1.5
+C_LIMIT = 1.5
 """The largest |C|."""
 
 
@@ -50,9 +50,9 @@ class Lafortune(Model):
     specular = PerLobe(
         8,
         specular_reflectance=Reflectance(0.2, "scale ρ of lobe i", role="specular"),
-        cx=Number(-1, (-FARTHEST, FARTHEST), "factor Cx of lobe i"),
-        cy=Number(-1, (-FARTHEST, FARTHEST), "factor Cy of lobe i", isotropic_as="cx"),
-        cz=Number(1, (-FARTHEST, FARTHEST), "factor Cz of lobe i"),
+        cx=Number(-1, (-C_LIMIT, C_LIMIT), "factor Cx of lobe i"),
+        cy=Number(-1, (-C_LIMIT, C_LIMIT), "factor Cy of lobe i", isotropic_as="cx"),
+        cz=Number(1, (-C_LIMIT, C_LIMIT), "factor Cz of lobe i"),
         exponent=Number(30, (0, 1e6), "exponent n of lobe i"),
     )
     normalization = Choice(("energy", "none"), "scale of the lobes")
@@ -72,7 +72,7 @@ class Lafortune(Model):
     def _largest(x: mi.Float, y: mi.Float, z: mi.Float) -> mi.Float:
         """Return Cmax. Where several are at the ends of their ranges, one that goes inwards does not change it."""
         largest = dr.maximum(dr.maximum(x, y), dr.maximum(z, 1e-6))  # for factors that are all zero
-        at_ends = sum(dr.select(c >= FARTHEST, 1, 0) for c in (x, y, z))
+        at_ends = sum(dr.select(c >= C_LIMIT, 1, 0) for c in (x, y, z))
         return dr.select(at_ends > 1, dr.detach(largest), largest)
 
 

@@ -139,6 +139,7 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
     if not part.passages:
         raise Skipped("Not checked, as it transmits from one side only.")
     tolerance, symmetric = 10 * run.rounding(part), not part.has(mi.BSDFFlags.NonSymmetric)
+    said = sampling.failing(run, part, eval_pdf, sampling.weight)  # what is wrong in any mode, once
     for sides in part.passages:
         wi, wo = run.probe.pairs(traced, COUNT, 65, sides)
         got = run.probe.eval(traced, wi, wo)
@@ -151,13 +152,12 @@ def _check_traced(run: Run, outcome: Outcome, part: Part, traced: Part) -> None:
         # What grazing facets transmit is faint and has few digits.
         outcome.differing(tolerance, name, got, expected, why, wi, wo, floor=1e-3, unknown=0, but_for=1e-3)
         samples = run.probe.sample(traced, wi, u := random(COUNT, 67))
-        # What is wrong in any mode is said once.
-        if not sampling.failing(run, part, eval_pdf):
+        if "eval_pdf" not in said:
             compare_joint(
                 run.probe, traced, outcome, tolerance, wi, wo, u, samples,
                 when="in the mode Importance ", floor=1e-3, unknown=0, but_for=1e-3, seed=67,
             )  # fmt: skip
-        if not sampling.failing(run, part, sampling.weight):
+        if "weight" not in said:
             name, reflected = "in the mode Importance a weight times pdf", samples.weight * samples.pdf[:, None]
             pair, lit = (reflected, samples.value), samples.lit
             outcome.differing(
@@ -206,12 +206,11 @@ def recorded(run: Run, part: Part, outcome: Outcome) -> str:
         si.wi, *others = (each * mi.Float(0.9999999) for each in (si.wi, *others))  # not computed yet
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
-            call(si, *others)
+            usual = call(si, *others)
             if dr.kernel_history([dr.KernelType.JIT, dr.KernelType.BlockReduce]):
                 outcome.fault(f"{name} asks for the values of an array, so that no renderer can record it in a loop")
                 continue
-        usual = _flat(call(si, *others))
-        for got, expected in zip(_flat(rendered[name](si, *others)), usual, strict=True):
+        for got, expected in zip(_flat(rendered[name](si, *others)), _flat(usual), strict=True):
             pair = numbers(got, COUNT), numbers(expected, COUNT)
             tolerance, words = 10 * run.rounding(part), f"recorded, as renderers call it, what {name} returns"
             outcome.differing(tolerance, words, *pair, "else", wi, wo, floor=1e-3, but_for=0.01, seed=70)
