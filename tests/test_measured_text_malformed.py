@@ -33,6 +33,7 @@ def any_table(text, counted=True):
         yield "a third", text[: len(text) // 3], True
         yield "without its last row", "".join(rows[:last]), True
     yield with_last("a word for a number", rows[last].strip().replace("0.", "O.", 1))
+    yield with_last("a number of Python's", rows[last].strip().replace("0.", "0_0.", 1))
     yield with_last("a row too short", re.split("[ ,]", rows[last])[0])
     yield with_last("a row twice as long", rows[last].strip() + " " + rows[last].strip())
     yield with_last("bytes in a row", "\x00\x01\x80\xff")

@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..loading import checked_mesh
+from ..mitsuba.errors import one_line
 from ..names import linked
 from ..preview import STAGES, preview_scene
 from ..preview.body import RADIUS
@@ -209,6 +210,8 @@ def _environment(name: str, path: Path) -> mi.Bitmap:
         pixels = np.array(bitmap)
     except MemoryError:
         raise ValueError(f"{name}: there is no memory for so many pixels; make it smaller.") from None
+    except RuntimeError as error:
+        raise ValueError(f"{name}: it is no picture that Mitsuba can read: {one_line(error)}") from None
     if not (pixels.size and np.isfinite(pixels).all() and pixels.max() > 0):
         raise ValueError(f"{name}: it has no light, or pixels that are not finite; write those as numbers.")
     return bitmap

@@ -146,11 +146,10 @@ class TextFile:
 
     def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
-        try:
-            return list(map(float, words))
-        except ValueError:
+        if not all(map(is_number, words)):
             bad = next(word for word in words if not is_number(word))
-            raise self.error(f"{shortened(bad)} should be {what}") from None
+            raise self.error(f"{shortened(bad)} should be {what}")
+        return list(map(float, words))
 
     def table(self, rows: Iterable[Sequence[str]], columns: int, what: str, more: bool = False) -> np.ndarray:
         """Return rows of words as numbers, shape (rows, columns); with ``more``, further columns are left out.
@@ -205,7 +204,7 @@ def is_number(word: str) -> bool:
         float(word)
     except ValueError:
         return False
-    return True
+    return "_" not in word  # which Python allows
 
 
 def whole(word: str) -> int:
