@@ -160,12 +160,12 @@ def sin_theta(w: mi.Vector3f) -> Any:
     return dr.sqrt(dr.maximum(w.x * w.x + w.y * w.y, TINY))
 
 
-def normalize_or(x: Any, y: Any, fallback: tuple[float, float]) -> tuple[Any, Any]:
-    """Return the 2-vector (x, y) scaled to length one, or ``fallback`` where its length is below 1e-12."""
+def unit(x: Any, y: Any) -> tuple[Any, Any]:
+    """Return the 2-vector (x, y) scaled to length one, or (1, 0) where its length is below 1e-12."""
     length2 = x * x + y * y
     valid = length2 > 1e-24  # the derivative takes its power -3/2
     scale = dr.rsqrt(dr.select(valid, length2, 1))
-    return dr.select(valid, x * scale, fallback[0]), dr.select(valid, y * scale, fallback[1])
+    return dr.select(valid, x * scale, 1), dr.select(valid, y * scale, 0)
 
 
 def choose(u: Any, probability: mi.Float) -> tuple[Any, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, TINY, Spectrum, choose, normalize_or, safe_sqrt
+from ..math import EPSILON, TINY, Spectrum, choose, safe_sqrt, unit
 from .lobe import AdjointLobe, Lobe
 
 
@@ -121,7 +121,7 @@ class RoughDiffuseLobe(Lobe):
 
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         a, b, c, d = self._matrix(wi)
-        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        x, y = unit(wi.x, wi.y)
         along, across = x * wo.x + y * wo.y, x * wo.y - y * wo.x
         det = c * (a - b * d)
         # The direction before the transform, times det.
@@ -141,6 +141,6 @@ class RoughDiffuseLobe(Lobe):
         disc.x = visible * (disc.x + end) - end
         z = safe_sqrt(1 - dr.squared_norm(disc))
         local = dr.normalize(mi.Vector3f(a * disc.x + b * z, c * disc.y, d * disc.x + z))
-        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        x, y = unit(wi.x, wi.y)
         wo = mi.Vector3f(local.x * x - local.y * y, local.x * y + local.y * x, local.z)
         return dr.select(is_uniform, mi.warp.square_to_uniform_hemisphere(v), wo)

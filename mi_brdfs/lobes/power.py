@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, ONE_MINUS_EPSILON, TINY, Spectrum, choose, expm1, log1p, normalize_or, safe_sqrt, sin_theta
+from ..math import EPSILON, ONE_MINUS_EPSILON, TINY, Spectrum, choose, expm1, log1p, safe_sqrt, sin_theta, unit
 from .lobe import Lobe
 
 
@@ -19,7 +19,7 @@ class AxisFrame:
     def __init__(self, axis: mi.Vector3f) -> None:
         self.axis = axis
         self.sin = sin_theta(axis)
-        x, y = normalize_or(axis.x, axis.y, (1, 0))
+        x, y = unit(axis.x, axis.y)
         self.up = mi.Vector3f(-axis.z * x, -axis.z * y, self.sin)
         self.side = mi.Vector3f(-y, x, 0)
 

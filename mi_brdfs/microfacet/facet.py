@@ -8,7 +8,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from ..math import SMALL, Spectrum, normalize_or
+from ..math import SMALL, Spectrum, unit
 
 
 class Cosines(NamedTuple):
@@ -97,7 +97,7 @@ class Facet:
     @property
     def azimuth(self) -> tuple[mi.Float, mi.Float]:
         """The direction of the half vector in the surface."""
-        return normalize_or(self.h.x, self.h.y, (1, 0))
+        return unit(self.h.x, self.h.y)
 
     @property
     def tan2_h(self) -> mi.Float:
@@ -106,5 +106,5 @@ class Facet:
 
 def _double_angle(axis: mi.Vector3f, x: mi.Vector3f, forward: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
     """Return cosine and sine of twice the angle from ``x`` to an axis, counter-clockwise for whom the light meets."""
-    cos, sin = normalize_or(dr.dot(axis, x), dr.dot(axis, dr.cross(forward, x)), (1, 0))
+    cos, sin = unit(dr.dot(axis, x), dr.dot(axis, dr.cross(forward, x)))
     return cos * cos - sin * sin, 2 * cos * sin

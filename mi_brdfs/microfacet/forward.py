@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, SMALL, normalize_or, safe_sqrt, sin_theta
+from ..math import EPSILON, SMALL, safe_sqrt, sin_theta, unit
 from .facet import Facet
 from .terms import Distribution
 
@@ -38,7 +38,7 @@ class ForwardDirections:
         self.z, self.sin = dr.maximum(wi.z, 1e-3), sin_theta(wi)  # cosines divide
         z2 = self.z * self.z
         self.broad = dr.sqrt(z2 + abs(fresnel.eta * fresnel.eta - 1))
-        self.x, self.y = x, y = normalize_or(wi.x, wi.y, (1, 0))
+        self.x, self.y = x, y = unit(wi.x, wi.y)
         u, v = (dr.rcp(slope2) for slope2 in slopes2)
         self.across = x * x * v + y * y * u
         self.ridge = x * y * (u - v) / (1 + self.across)
@@ -54,7 +54,7 @@ class ForwardDirections:
 
     @classmethod
     def of_facets(cls, fresnel: Any, distribution: Distribution, wi: mi.Vector3f) -> ForwardDirections:
-        x, y = normalize_or(wi.x, wi.y, (1, 0))
+        x, y = unit(wi.x, wi.y)
         alphas2 = dr.square(distribution.alpha_u), dr.square(distribution.alpha_v)
         along = alphas2[0] * x * x + alphas2[1] * y * y
         slope2 = distribution.inverse_cdf(cls.TYPICAL, 1 - cls.TYPICAL, 1 / along)
@@ -77,7 +77,7 @@ class ForwardDirections:
 
     def pdf(self, facet: Facet) -> mi.Float:
         z = facet.wo.z
-        x, y = normalize_or(facet.wo.x, facet.wo.y, (1, 0))
+        x, y = unit(facet.wo.x, facet.wo.y)
         m, sigma = self._azimuth(z, safe_sqrt(1 - z * z))
         tan = (self.x * y - self.y * x) / dr.maximum(1 - (self.x * x + self.y * y), SMALL)
         inverse = dr.rsqrt(1 + dr.square((tan - m) / sigma))

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, SMALL, choose, clamp, normalize_or, safe_sqrt, select
+from ..math import EPSILON, SMALL, choose, clamp, safe_sqrt, select, unit
 from .facet import Facet
 from .terms import Distribution, Fresnel, HalfVectors
 
@@ -115,7 +115,7 @@ class ClippedNormals:
 
     def draw(self, v: mi.Point2f) -> tuple[Facet, Facet]:
         at = self.law.draw(0, v)
-        x, y = normalize_or(self.u * at.x, self.v * at.y, (1, 0))
+        x, y = unit(self.u * at.x, self.v * at.y)
         g, mass, rest = self._line(x, y)
         tan = safe_sqrt(self.distribution.inverse_cdf(at.z * mass, rest + (1 - at.z) * mass, g))
         facet = Facet.at(self.wi, tan * x, tan * y)
@@ -124,7 +124,7 @@ class ClippedNormals:
     def pdf(self, facet: Facet) -> mi.Float:
         x, y = facet.azimuth
         g, mass, _ = self._line(x, y)
-        cos, sin = normalize_or(x / self.u, y / self.v, (1, 0))
+        cos, sin = unit(x / self.u, y / self.v)
         m = clamp(self.distribution.cdf(facet.tan2_h, g)[0] / mass, 0, 1)
         density = self.law.pdf(mi.Vector3f(cos, sin, m)) * self.distribution.density(facet, g) / mass
         if self.distribution.anisotropic:
@@ -223,5 +223,5 @@ def clipped_normals(distribution: Distribution, fresnel: Fresnel, wi: mi.Vector3
         seen = lean * dr.inv_pi * slope2 * dr.square(bright)
         share = dr.minimum(seen / (seen + dr.square(dr.maximum(wi.z, EPSILON))), MOST)
         u, v = stretch(distribution, wi)
-        law = MixedProposals(law, Leaning(*normalize_or(u * wi.x, v * wi.y, (1, 0))), share)
+        law = MixedProposals(law, Leaning(*unit(u * wi.x, v * wi.y)), share)
     return ClippedNormals(distribution, wi, law)

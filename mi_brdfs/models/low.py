@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..lobes import Lobe, MicrofacetLobe, over_diffuse
-from ..math import EPSILON, SMALL, Spectrum, choose, clamp, luminance, normalize_or, safe_sqrt
+from ..math import EPSILON, SMALL, Spectrum, choose, clamp, luminance, safe_sqrt, unit
 from ..microfacet.distributions import ABC
 from ..microfacet.facet import Facet
 from ..microfacet.forward import ForwardDirections
@@ -132,7 +132,7 @@ class SmoothLobe(Lobe):
     def eval_pdf(self, wi: mi.Vector3f, wo: mi.Vector3f) -> tuple[Spectrum, mi.Float]:
         dx, dy = wi.x + wo.x, wi.y + wo.y
         d2 = dx * dx + dy * dy
-        x, y = normalize_or(dx, dy, (1, 0))
+        x, y = unit(dx, dy)
         shape = self.law.eval(d2) * wo.z
         value = self._reflectance(wi, wo.x, wo.y) * shape
         mass = self._mass(wi, x, y)

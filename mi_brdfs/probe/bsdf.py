@@ -252,15 +252,13 @@ class BSDFProbe:
         density, component, kind, eta, pdf, smooth = (column[:, 0] for column in columns)
         return Samples(wo.astype(np.float32), weight, density, component, kind, eta, value, pdf, smooth > 0)
 
-    def pairs(
-        self, part: Part, count: int, seed: int, sides: tuple[int, int] | None = None, uv: ArrayLike = CENTRE
-    ) -> tuple[Array, Array]:
+    def pairs(self, part: Part, count: int, seed: int, sides: tuple[int, int] | None = None) -> tuple[Array, Array]:
         """Return directions all over a side, and others on the same or another side, half of them as they are drawn; by
         default of all the ways that light may go."""
         ways = [sides] if sides else part.passages or [(side, side) for side in part.sides]
         side, other = np.random.default_rng(seed).choice(ways, count).T
         wi, wo = on_side(hemisphere(count, seed), side), on_side(hemisphere(count, seed + 1), other)
-        drawn = self.sample(part, wi, random(count, seed + 2), uv).wo
+        drawn = self.sample(part, wi, random(count, seed + 2)).wo
         near = (np.arange(count) % 2 == 0) & (drawn[:, 2] * other > 0.01)
         return wi, np.where(near[:, None], drawn, wo)
 

@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..math import choose, normalize_or, select
+from ..math import choose, select, unit
 from ..measured.arrays import DRJIT, stacked, vector
 from ..measured.coordinates import TWO_PI, polar_angle, spherical, wrapped
 from ..measured.grid import Extrapolation, Grid, Interpolation
@@ -50,7 +50,7 @@ class Proposal:
         x, y, z = wi.x + wo.x, wi.y + wo.y, wi.z + wo.z
         across = DRJIT.sqrt(x * x + y * y)
         u = DRJIT.sqrt(DRJIT.atan2(across, z) * (2 / dr.pi))
-        cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
+        cos_phi, sin_phi = unit(wi.x, wi.y)
         turn = DRJIT.atan2(y * cos_phi - x * sin_phi, x * cos_phi + y * sin_phi) * dr.inv_two_pi
         v = turn - dr.floor(turn) if self.anisotropic else 2 * abs(turn)
         # As in half_vectors, where 4 (wi·h) sinθh = 2 |(x, y)|.
@@ -65,7 +65,7 @@ class Proposal:
         place, _ = self.warp.sample(v, self._given(wi))
         turn = place.x if self.anisotropic else place.x * dr.select(side < 0.5, 0.5, -0.5)
         (sin, cos), (y, x) = dr.sincos(dr.square(place.y) * (dr.pi / 2)), dr.sincos(turn * dr.two_pi)
-        cos_phi, sin_phi = normalize_or(wi.x, wi.y, (1, 0))
+        cos_phi, sin_phi = unit(wi.x, wi.y)
         h = mi.Vector3f(sin * (x * cos_phi - y * sin_phi), sin * (y * cos_phi + x * sin_phi), cos)
         return select(cosine, disk, 2 * dr.dot(wi, h) * h - wi)
 
