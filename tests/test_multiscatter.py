@@ -114,6 +114,26 @@ def test_the_colour_is_that_of_a_walk(alpha, distribution, shadowing):
 
 
 @pytest.mark.parametrize(
+    ("alpha", "distribution"), [((0.1, 0.1), "beckmann"), ((0.45, 0.45), "ggx"), ((1.0, 0.25), "beckmann")]
+)
+def test_nor_far_from_it_where_little_is_reflected_or_nearly_all(alpha, distribution):
+    """Of tints that nearly vanish at grazing, and of the mean or at one angle alone, and beside an f0 of 1."""
+    tints = [(f0, f82, f90) for f0 in (0.0, 0.05, 0.9, 1.0) for f82 in (0.0, 0.5, 1.0) for f90 in (0.0, 1.0)]
+
+    def every(cos):
+        return np.stack([ref.fresnel_generalized_schlick(cos, *tint) for tint in tints], axis=1)
+
+    angles, rng = (5, 60, 80), np.random.default_rng(3)
+    walks = [walk(distribution, *alpha, direction(theta, 90), every, 50_000, rng) for theta in angles]
+    for k, (f0, f82, f90) in enumerate(tints):
+        ours = albedos(facets("walk", alpha, distribution, f0=f0, f82=f82, f90=f90), angles, 90)[:, 0]
+        for albedo, theta, (energy, error) in zip(ours, angles, walks, strict=True):
+            far = 0.03 if f82 < 0.5 else 0.007 if theta <= 60 else 0.015
+            noise = 3 * np.sqrt((error[:, k] ** 2).sum())
+            assert abs(albedo - energy[:, k].sum()) < far + noise, (f0, f82, f90, theta)
+
+
+@pytest.mark.parametrize(
     ("given", "fresnel"),
     [
         ({"f0": 0.3, "schlick_exponent": 1.0}, lambda c: 1 - 0.7 * c),

@@ -74,19 +74,22 @@ class WalkLobe(MultipleScattering):
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁(w) is F̄₁ and what F
     differs by from its means both at the first and at a later reflection of light from w. On facets that are seen at
     grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about
-    R(wi) times the mean of R(wo).
+    R(wi) times the mean of R(wo). Of an F that nearly vanishes on the mean, R is at most twice the larger of both.
     """
+
+    MOST = 1.25
+    """The largest F₁: beside an F̄₁ of nearly 1 it is more than 1 in some directions, so that the mean of R is right."""
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         mean = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip)
         between, third = Fresnel.mean(self.fresnel, *self.mean.between), self.mean.third
         later = between * third / (1 - between * (1 - third))
-        scale = reflectance / dr.square(4 * dr.maximum(mean, EPSILON))
-        return mean, scale * later, scale * (1 - later)
+        return mean, 0.25 / dr.maximum(mean, EPSILON), reflectance * later, reflectance * (1 - later)
 
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        mean, later, sooner = self.colours
-        first, last = (dr.square(Fresnel.mean(self.fresnel, end.schlick, end.dip) + mean) for end in (i, o))
+        mean, scale, later, sooner = self.colours
+        own = (Fresnel.mean(self.fresnel, end.schlick, end.dip, self.MOST) for end in (i, o))
+        first, last = (dr.minimum(dr.square(f + mean) * scale, 2 * dr.maximum(f, mean)) for f in own)
         return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
 
 
