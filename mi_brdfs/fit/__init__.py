@@ -64,8 +64,8 @@ def fit(
     that are declared to make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the
     parameters of ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later
     papers added to the models of facets (f82, f90, schlick_exponent, film_thickness, film_ior, haze, haze_spread,
-    retroreflectivity) and the index outside stay as they are, unless they are given as "free". A thickness takes 64
-    starts or more, as each order of interference is a valley of its own.
+    retroreflectivity) and the index outside stay as they are, unless they are given as "free". A fit of a
+    thickness has 256 starts or more, as each order of interference is a valley of its own.
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are
@@ -135,7 +135,8 @@ def fit(
             if all(warm(configuration, each_start) is None for configuration, _ in todo):
                 raise FitError(f"No fit can start at {each_start}: it is of another plugin, or has other parameters.")
         ended, ranked = 0, []
-        total = sum(len(alike) for _, alike in todo) * (starts + len(given_starts))
+        counts = [starts and max(starts, *(it.quantity.starts for it in each.unknowns)) for each, _ in todo]
+        total = sum(len(alike) * (count + len(given_starts)) for (_, alike), count in zip(todo, counts, strict=True))
 
         def advance(count: int) -> None:
             nonlocal ended
@@ -143,9 +144,9 @@ def fit(
             if progress:
                 progress(ended, total)
 
-        for configuration, alike in todo:
+        for (configuration, alike), count in zip(todo, counts, strict=True):
             own = [materials[k] for k in alike]
-            fits = fit_configuration(configuration, own, metric, starts, given_starts, seed, advance)
+            fits = fit_configuration(configuration, own, metric, count, given_starts, seed, advance)
             ranked += list(zip(alike, fits, strict=True))
     return [it for _, it in sorted(ranked, key=lambda pair: (pair[0], pair[1].held_out))]
 

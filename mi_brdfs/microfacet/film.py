@@ -25,7 +25,8 @@ class Thickness(Number):
 
     @property
     def spellings(self) -> list[tuple[Quantity, ...]]:
-        return [(Quantity(self.names[0], self.limits, None, self.text, usual=(0, 1000), sought=False),)]
+        # Each order of interference is a valley of its own, on either side of the index below.
+        return [(Quantity(self.names[0], self.limits, None, self.text, usual=(0, 1000), sought=False, starts=256),)]
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
         thickness = super().evaluate(si, active)

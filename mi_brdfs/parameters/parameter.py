@@ -38,6 +38,8 @@ class Quantity(NamedTuple):
     """Where its values usually are, if that is not nearly all of its range."""
     sought: bool = True
     """Whether fits seek it."""
+    starts: int = 0
+    """The least number of starts of a fit that does, where the error has many valleys."""
     isotropic_as: str | None = None
     """Of an isotropic material the name of another one that it equals, or "" if it has its default."""
 
