@@ -87,6 +87,20 @@ def test_a_choice_of_each_lobe():
     assert 'slip: shade_2 = "dim" is unknown; it must be one of "full" or "half"' in told(shade_2="dim", scale_1=0.1)
 
 
+def test_a_kind_of_others_reads_the_numbered_names():
+    """Or is refused: what was given would do nothing."""
+
+    class Careless(Number):
+        def bind(self, reader):
+            return self.replace(
+                textures={self.name: reader.number(self.name, 0, self.limits)}, ranges={self.name: self.limits}
+            )
+
+    model(lambda self, p: (LambertLobe(0.1),), parts=PerLobe(2, width=Careless(0.5, (0, 1), "width")))
+    assert radiance(width=0.2) == pytest.approx(0.1)
+    assert "width: Careless must read self.names[0], width_1, not width" in told(width_1=0.2, width_2=0.3)
+
+
 def test_choices_are_attributes_whatever_declares_them():
     """A word with parameters of its own, and among these other words, some with parameters, too."""
 

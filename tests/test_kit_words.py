@@ -7,9 +7,11 @@ import pytest
 from support import call, hemisphere
 
 import mi_brdfs
+from mi_brdfs.explorer.controls import controls_of, with_value
 from mi_brdfs.microfacet import Fresnel, Shadowing
 from mi_brdfs.microfacet.distributions import Beckmann
-from mi_brdfs.parameters import Number
+from mi_brdfs.mitsuba.registry import find_model
+from mi_brdfs.parameters import Choice, Flag, Number
 
 pytestmark = pytest.mark.usefixtures("as_before")
 
@@ -60,6 +62,42 @@ def test_each_kind_of_term_has_a_word():
     keys = mi.traverse(mi.load_dict({"type": "walter", "fresnel": "squared"})).keys()
     assert "edge.value" in keys
     assert "dusk" in mi_brdfs.info("microfacet") and "reflectance at grazing" in mi_brdfs.info("cooktorrance")
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_choices_and_flags_reach_the_term():
+    class Tailed(Steep):
+        word = "tailed"
+        parameters = {**Steep.parameters, "tail": Choice(("short", "long"), "tail"), "twice": Flag(False, "twice")}
+
+        def __init__(self, alpha_u, alpha_v, tail, twice):
+            scale = (3 if tail == "long" else 1) * (2 if twice else 1)
+            super().__init__(scale * alpha_u, scale * alpha_v)
+
+    mi_brdfs.register(Tailed)
+    for words, alpha in ({}, 0.1), ({"tail": "long"}, 0.3), ({"tail": "long", "twice": True}, 0.6):
+        found = values(distribution="tailed", alpha_u=0.1, alpha_v=0.1, **words)
+        np.testing.assert_allclose(found, values(distribution="beckmann", alpha_u=alpha, alpha_v=alpha), rtol=1e-5)
+
+
+@pytest.mark.usefixtures("llvm_rgb")
+def test_the_explorer_has_a_fresnel_term_of_others():
+    """Its numbers bring its word, which gives way to other terms."""
+    mi_brdfs.register(Squared)
+    bsdf, walter = {"type": "walter", "f0": 0.5}, find_model("walter")
+
+    def controls():
+        return {it["name"]: it for it in controls_of(walter, bsdf)}
+
+    assert controls()["fresnel"]["words"] == ["squared"]
+    for name, value, expected in (
+        ("edge", 0.3, {"fresnel": "squared", "edge": 0.3}),
+        ("int_ior", 1.5, {"int_ior": 1.5}),
+        ("fresnel", "squared", {"fresnel": "squared"}),
+        ("edge", 0.4, {"fresnel": "squared", "edge": 0.4}),
+    ):
+        bsdf = with_value(bsdf, controls()[name], value)
+        assert bsdf == {"type": "walter", **expected}
 
 
 def told(**given):

@@ -54,7 +54,7 @@ def info(type: Annotated[str, typer.Argument(metavar="TYPE", help="A type or ali
     """Show the manual page of a BRDF."""
     with failing(Exit.ERROR):
         plugin = find_plugin(type)
-    if out.is_terminal:  # the console folds lines, unlike `out`
-        show(plugin, Terminal(width=min(out.width, WIDEST), emoji=False, highlight=False))
-    else:
-        out.print(plain(plugin))
+        if out.is_terminal:  # the console folds lines, unlike `out`
+            show(plugin, Terminal(width=min(out.width, WIDEST), emoji=False, highlight=False))
+        else:
+            out.print(plain(plugin))

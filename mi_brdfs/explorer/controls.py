@@ -51,12 +51,18 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
         elif parameter.spellings:
             yield from _spelled(parameter, bsdf, group)
         elif parameter.implied_words:
-            for own in parameter.words.values():
+            name = parameter.name
+            brought = [word for word in parameter.words if word not in parameter.implied_words]
+            if brought:
+                control = _control(name, parameter.text, "choice", bsdf.get(name), None, FRESNEL)
+                yield control | {"words": brought, "optional": True, "excludes": parameter.rivals(name)}
+            for word, own in parameter.words.items():
                 # Colours of a word, η and k, cannot be alone.
                 colours = [name for name, it in own.items() if any(q.colour for q in it.quantities(pairs=False))]
                 for control in _controls(own.values(), bsdf, FRESNEL):
-                    also = {name: [1.0, 1.0, 1.0] for name in colours if name != control["name"]}
-                    excludes = parameter.rivals(control["name"])
+                    also: Bsdf = {colour: [1.0, 1.0, 1.0] for colour in colours if colour != control["name"]}
+                    also |= {name: word} if word in brought else {}
+                    excludes = [*parameter.rivals(control["name"]), *control["excludes"]]
                     yield control | {"optional": True, "excludes": excludes, "also": also}
         elif False in parameter.words:
             name, default = parameter.names[0], parameter.fit_words[0]

@@ -71,6 +71,9 @@ def page(
             now.setdefault(control["name"], control["value"])
     if missing := [name for name in vary or {} if name not in now]:
         raise StateError(f"{missing[0]} is no number of these BSDFs; choose {listed(now)}.")
+    for control in chain(*controls):
+        if control["name"] in (vary or {}) and (rivals := (vary or {}).keys() & control["excludes"]):
+            raise StateError(f"{control['name']} and {min(rivals)} exclude each other; vary one of them.")
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
     vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
     views = set(VIEWS if len(vary) == 1 else state.views)

@@ -27,8 +27,8 @@ ENTRY_POINTS = "mi_brdfs.models"
 """The entry-point group for models of installed packages."""
 _files: dict[str, str] = {}
 """The files imported by path, by module name."""
-_of_bsdfs: list[str] = []
-"""The modules that define BSDFs of Mitsuba's own kind."""
+_imported: dict[str, bool] = {}
+"""The modules that :func:`import_models` has imported, and whether they define BSDFs of Mitsuba's own kind."""
 
 
 def register_installed() -> None:
@@ -75,10 +75,10 @@ def import_models(target: str) -> None:
     except BaseException as error:
         raise ImportError(_sentence(error, path)) from None
     found = _brought_by(module)
-    if _defines_bsdf(module):
-        _of_bsdfs.append(module.__name__)
-    elif not found and all_models() == known:
+    has_bsdfs = _defines_bsdf(module)
+    if not (found or has_bsdfs) and all_models() == known:
         raise ValueError("it defines no subclass of mi_brdfs.Model or mi.BSDF, nor a term of the kit with a word")
+    _imported[module.__name__] = has_bsdfs
     for each in found:
         register(each)
 
@@ -96,17 +96,16 @@ def _defines_bsdf(module: ModuleType) -> bool:
 
 def source(brought: type[Model] | type[Term]) -> str | None:
     """Return the argument of :func:`import_models` with which another process gets a model or a term; None if there is
-    none, e.g. for one defined in a notebook or a function."""
-    module = sys.modules.get(brought.__module__)
-    if brought.__module__ == "__main__" or module is None or brought not in _brought_by(module):
-        return None
-    return _files.get(brought.__module__, brought.__module__)
+    none, as for one defined in a notebook, or in a function of a module that was not imported so."""
+    name, module = brought.__module__, sys.modules.get(brought.__module__)
+    is_there = name in _imported or (module is not None and brought in _brought_by(module))
+    return _files.get(name, name) if is_there and name != "__main__" else None
 
 
 def sources() -> list[str]:
     """Return the sources of all models, terms and BSDFs registered by others."""
     brought: list[Any] = [*brought_terms().values(), *(model for model in all_models() if not is_own(model))]
-    found = [*map(source, brought), *(_files.get(name, name) for name in _of_bsdfs)]
+    found = [*map(source, brought), *(_files.get(name, name) for name, has_bsdfs in _imported.items() if has_bsdfs)]
     return [each for each in dict.fromkeys(found) if each]
 
 
@@ -129,7 +128,11 @@ def _of_file(path: Path) -> ModuleType:
     sys.modules[name] = module  # where dataclasses and pickle look it up
     if (folder := str(path.parent.resolve())) not in sys.path:
         sys.path.append(folder)  # what it imports may be beside it
-    exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
+    try:
+        exec(spec.loader.source_to_code(path.read_bytes(), str(path)), module.__dict__)  # caches miss quick edits
+    except BaseException:
+        del sys.modules[name]  # it may be imported again, in a variant
+        raise
     _files[name] = str(path.resolve())
     return module
 

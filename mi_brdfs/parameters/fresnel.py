@@ -47,8 +47,11 @@ class FresnelSet(OneTerm):
         return [*own, *([self.name] if self.brought else [])]
 
     def rivals(self, name: str) -> list[str]:
-        declared = next((it for it in self.words.values() if name in it), {})
-        return [other for other in self.names if other not in declared]
+        own = [self.name]
+        for word in self.words:
+            if name in (names := self.names_of(word)):
+                own = names if word in self.implied_words else [self.name, *names]
+        return [other for other in self.names if other not in own]
 
     def _word(self, reader: PropertyReader) -> str:
         """Return the word that the given parameters imply, or that is given."""

@@ -72,10 +72,10 @@ class OneOf(Chosen[str]):
         return word
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
-        return SimpleNamespace(**self.own.evaluate(si, active))
+        return SimpleNamespace(**self.own.words, **self.own.evaluate(si, active))
 
     def placeholder(self) -> Any:
-        return SimpleNamespace(**self.own.placeholders())
+        return SimpleNamespace(**self.own.words, **self.own.placeholders())
 
     def rows(self) -> list[ParameterRow]:
         return self._rows(tuple(self.words), next(iter(self.words)))
@@ -109,10 +109,10 @@ class OneTerm(OneOf):
         return functools.partial(self.terms[self.word].of_values, values)
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
-        return self._made_of(self.own.evaluate(si, active))
+        return self._made_of(self.own.words | self.own.evaluate(si, active))
 
     def placeholder(self) -> Any:
-        return self._made_of(self.own.placeholders())
+        return self._made_of(self.own.words | self.own.placeholders())
 
 
 class PerLobe(Parameter):
@@ -151,6 +151,9 @@ class PerLobe(Parameter):
 
     def bind(self, reader: PropertyReader) -> PerLobe:
         lobes = [BoundParameters(self.lobe(number), reader) for number in self._given(reader)]
+        for it in (it for lobe in lobes for it in lobe.values()):
+            for name in it.textures.keys() - it.names:
+                raise TypeError(f"{it.name}: {type(it).__name__} must read self.names[0], {it.names[0]}, not {name}")
         bound = {
             of: {name: value for lobe in lobes for name, value in getattr(lobe, of).items()}
             for of in ("textures", "ranges", "roles")
@@ -171,10 +174,10 @@ class PerLobe(Parameter):
         return numbers
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> list[SimpleNamespace]:
-        return [SimpleNamespace(**lobe.chosen, **lobe.evaluate(si, active)) for lobe in self.lobes]
+        return [SimpleNamespace(**lobe.words, **lobe.evaluate(si, active)) for lobe in self.lobes]
 
     def placeholder(self) -> list[SimpleNamespace]:
-        return [SimpleNamespace(**lobe.chosen, **lobe.placeholders()) for lobe in self.lobes]
+        return [SimpleNamespace(**lobe.words, **lobe.placeholders()) for lobe in self.lobes]
 
     def rows(self) -> list[ParameterRow]:
         return [row for parameter in self.lobe("_i") for row in parameter.rows()]

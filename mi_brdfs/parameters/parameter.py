@@ -176,7 +176,8 @@ def nested(declared: Iterable[Parameter]) -> Iterator[Parameter]:
 class BoundParameters(dict[str, Parameter]):
     """Several parameters bound together, by declared name, with all their ``textures``, ``ranges`` and ``roles``.
 
-    Choices are not among the parameters: ``chosen`` has their words and flags.
+    Choices are not among the parameters: ``chosen`` has their words and flags, also of what belongs to others, and
+    ``words`` those that are declared here.
     """
 
     def __init__(self, declared: Iterable[Parameter], reader: PropertyReader):
@@ -185,10 +186,11 @@ class BoundParameters(dict[str, Parameter]):
         self.ranges: dict[str, Range] = {}
         self.roles: dict[str, str] = {}
         self.chosen: dict[str, Any] = {}
+        self.words: dict[str, Any] = {}
         for parameter in declared:
             bound = parameter.bind(reader)
             if not isinstance(bound, Parameter):
-                self.chosen[parameter.name] = bound
+                self.words[parameter.name] = self.chosen[parameter.name] = bound
                 continue
             self[parameter.name] = bound
             self.textures |= bound.textures

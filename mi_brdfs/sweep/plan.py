@@ -118,8 +118,8 @@ class Sweep:
         for model in find_models(self.models) if workers or scheduler else ():
             if not is_own(model) and not guests.source(model):
                 raise ValueError(
-                    f"{model.plugins[0]} is defined in the script that runs; put it into a module, to be imported by "
-                    "workers."
+                    f"{model.plugins[0]} is defined in the script that runs, or by a function; put its class into a "
+                    "module, to be imported by workers."
                 )
         left: dict[tuple[str, str], list[dict[str, Any]]] = {}
         done = self._done()

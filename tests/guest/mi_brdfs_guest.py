@@ -20,24 +20,25 @@ class Percent(Parameter):
 
     @property
     def spellings(self):
-        return [(Quantity(self.name, self.limits, self.default, self.text),)]
+        return [(Quantity(self.names[0], self.limits, self.default, self.text),)]
 
     @property
     def tried(self):
         return 0.0, 25.0, 50.0, 75.0
 
     def bind(self, reader):
-        texture = reader.number(self.name, self.default, self.limits)
-        return self.replace(textures={self.name: texture}, ranges={self.name: self.limits})
+        name = self.names[0]
+        texture = reader.number(name, self.default, self.limits)
+        return self.replace(textures={name: texture}, ranges={name: self.limits})
 
     def evaluate(self, si, active):
-        return 0.01 * clamp(self.textures[self.name].eval_1(si, active), *self.limits)
+        return 0.01 * clamp(self.textures[self.names[0]].eval_1(si, active), *self.limits)
 
     def placeholder(self):
         return mi.Float(0)
 
     def rows(self):
-        return [ParameterRow(self.name, "number", f"{self.default:g}", "[0, 100] %", self.text)]
+        return [ParameterRow(self.names[0], "number", f"{self.default:g}", "[0, 100] %", self.text)]
 
 
 class LommelSeeliger(mi_brdfs.Model):
