@@ -33,6 +33,7 @@ def image(file):
     [
         (["ward", "--param", "alpha=.3", "-D", "specular_reflectance=#ff0000", "-Ddiffuse_reflectance=0"], "ward"),
         (["scene.xml:moon", "--stage", "point"], "scene_moon"),
+        (["phong:exponent=.5"], "phong_exponent_0_5"),
         (['<!-- <bsdf type="old"/> --><bsdf type="lambert"/>', "--stage", "lamp"], "bsdf"),
     ],
 )

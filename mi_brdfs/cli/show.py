@@ -39,7 +39,9 @@ def show(
     given = parameters_of(parameters)
     if stage not in STAGES:
         fail(f"--stage {stage}: there is no such stage; there are {', '.join(STAGES)}", Exit.USAGE)
-    name = "bsdf" if material.startswith("<") else re.sub(r"[^\w-]+", "_", Path(material).name.replace(".xml", ""))
+    # So that .5 and 5 have names of their own.
+    written_out = re.sub(r"(?<!\d)\.(?=\d)", "0.", Path(material).name.replace(".xml", ""))
+    name = "bsdf" if material.startswith("<") else re.sub(r"[^\w-]+", "_", written_out)
     files = output_files(output or Path(f"{name[:100] or 'bsdf'}.exr"))
     set_variant(variant)
 

@@ -10,6 +10,7 @@ import re
 import stat
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -146,10 +147,11 @@ class TextFile:
 
     def numbers(self, words: Sequence[str], what: str = "a number") -> list[float]:
         """Return words as numbers, also ``nan`` and ``inf``, or raise a FileError."""
-        if not all(map(is_number, words)):
-            bad = next(word for word in words if not is_number(word))
-            raise self.error(f"{shortened(bad)} should be {what}")
-        return list(map(float, words))
+        if "_" not in "".join(words):  # which Python allows
+            with suppress(ValueError):
+                return list(map(float, words))
+        bad = next(word for word in words if not is_number(word))
+        raise self.error(f"{shortened(bad)} should be {what}")
 
     def table(self, rows: Iterable[Sequence[str]], columns: int, what: str, more: bool = False) -> np.ndarray:
         """Return rows of words as numbers, shape (rows, columns); with ``more``, further columns are left out.
@@ -204,7 +206,7 @@ def is_number(word: str) -> bool:
         float(word)
     except ValueError:
         return False
-    return "_" not in word  # which Python allows
+    return "_" not in word
 
 
 def whole(word: str) -> int:
