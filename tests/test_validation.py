@@ -34,6 +34,7 @@ from mutants import (
 from support import shared
 from test_cli import invoke
 
+import mi_brdfs
 from mi_brdfs.lobes import LambertLobe
 from mi_brdfs.models.lambert import Lambert
 from mi_brdfs.probe.arrays import context
@@ -72,6 +73,15 @@ def test_mutants_are_caught(mutant):
         if finding.check in ("weight", "chi2", "reciprocity", "horizon"):
             assert len(finding.at["wi"]) == 3, finding
             assert ("seed" in finding.at) == (finding.check in ("weight", "chi2")) or finding.check == "horizon"
+
+
+@pytest.mark.usefixtures("as_before")
+def test_what_is_not_reciprocal_is_said_once():
+    """By the check of that name, and in polarized variants, too, where it is not made."""
+    (base,) = (it.model for it in MUTANTS if it.name == "missing cosine")
+    mi_brdfs.register(type("OneWay", (base,), {"__doc__": "One way.", "plugins": ("one_way",)}))
+    for only, failing in (["reciprocity", "polarization"], {"reciprocity"}), (["polarization"], {"polarization"}):
+        assert {finding.check for finding in check({"type": "one_way"}, only=only, angles=(60,)).failures} == failing
 
 
 def test_the_derivative_is_that_of_its_texel():

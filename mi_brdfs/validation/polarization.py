@@ -18,7 +18,9 @@ from ..probe.variates import random
 from .incidents import all_over
 from .outcome import Outcome, Skipped, skipping
 from .run import Run, anywhere, failures, of_whole, tell
+from .sampling import failing
 from .spectral import AGAIN
+from .values import reciprocity
 
 COUNT = 2000
 TOLERANCE = 1e-3
@@ -34,7 +36,7 @@ BACK = np.array([1, 1, -1, 1])
 def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
     are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
-    NonSymmetric; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
+    NonSymmetric or the check reciprocity has failed; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
     frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
     ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
     Importance, for exchanged directions. Of delta functions, the weights of samples are looked at, and not exchanged.
@@ -58,7 +60,7 @@ def polarization(run: Run, part: Part, outcome: Outcome) -> str:
             of_eval = _judged(bsdf, "eval's", _mueller, wi, wo)
             exchanged = _of_f(_mueller(bsdf, wo, wi), wi)
             others = _others(run, bsdf, wi, wo, of_eval.matrices, exchanged)
-            if not part.has(mi.BSDFFlags.NonSymmetric):
+            if not (part.has(mi.BSDFFlags.NonSymmetric) or failing(run, part, reciprocity, anew=False)):
                 of_eval.same["if its directions are exchanged"] = exchanged.swapaxes(-1, -2) * BACK * BACK[:, None]
             judged.append(of_eval)
         if run.probe.deltas:
