@@ -35,11 +35,12 @@ BACK = np.array([1, 1, -1, 1])
 @of_whole
 def polarization(run: Run, part: Part, outcome: Outcome) -> str:
     """Check Mueller matrices: light of any polarization becomes light that is at most fully polarized; if directions
-    are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged
-    NonSymmetric or the check reciprocity has failed; and if both turn about the normal, and the intensity does not change, nothing else does, in reference
-    frames that turn, too, unless light goes straight through, as through a polarizer. And values of ``eval_pdf`` and
-    ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does ``eval`` in the mode
-    Importance, for exchanged directions. Of delta functions, the weights of samples are looked at, and not exchanged.
+    are exchanged, they are transposed, but for the signs of the third row and column, unless it is flagged NonSymmetric
+    or the check reciprocity has failed; and if both turn about the normal, and the intensity does not change, nothing
+    else does, in reference frames that turn, too, unless light goes straight through, as through a polarizer. And
+    values of ``eval_pdf`` and ``eval_pdf_sample`` and weights of samples polarize light as ``eval`` does, and so does
+    ``eval`` in the mode Importance, for exchanged directions. Of delta functions, the weights of samples are looked at,
+    and not exchanged.
 
     The first elements of values, and of the weights of delta functions, are what the unpolarized variant has, if the
     BSDF works there, to float32's rounding; and by them, too, values are finite, weights are eval/pdf, as many samples
