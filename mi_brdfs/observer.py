@@ -13,8 +13,12 @@ def to_srgb(wavelengths: np.ndarray) -> np.ndarray:
     them and constant beyond, into linear sRGB under D65."""
     fine, weights = observer()
     position = np.interp(fine, wavelengths, np.arange(len(wavelengths)))
-    # Each wavelength has a share that falls linearly to 0 at those beside it.
-    return np.maximum(1 - abs(position - np.arange(len(wavelengths))[:, None]), 0) @ weights
+    below = position.astype(np.int64)
+    share = (position - below)[:, None]
+    result = np.zeros((len(wavelengths) + 1, 3))
+    np.add.at(result, below, (1 - share) * weights)
+    np.add.at(result, below + 1, share * weights)
+    return result[:-1]
 
 
 @functools.cache
