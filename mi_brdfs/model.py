@@ -149,7 +149,7 @@ class Plugin:
         return [value for value in members.values() if isinstance(value, Parameter)]
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Values:
-        """Return the values of the parameters at a surface interaction, except for choices."""
+        """Return the values of the parameters at a surface interaction."""
         return Values(**self.parameters.evaluate(si, active))
 
     def described(self) -> str:

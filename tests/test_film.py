@@ -195,6 +195,7 @@ def test_derivatives_are_those_of_differences(name, variant):
 
 
 PLANTED = [
+    ({"int_ior": 1.5}, {"int_ior": 1.5}, {"film_thickness": 380.0, "film_ior": 2.0}),
     ({"int_ior": 1.52}, {"fresnel": "dielectric"}, {"film_thickness": 412.0, "film_ior": 1.9}),
     ({"int_ior": 1.8}, {"fresnel": "dielectric"}, {"film_thickness": 600.0, "film_ior": 1.33}),
     ({"material": "Cr"}, {"material": "Cr"}, {"film_thickness": 700.0, "film_ior": 1.33}),

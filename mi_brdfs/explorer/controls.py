@@ -51,19 +51,7 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
         elif parameter.spellings:
             yield from _spelled(parameter, bsdf, group)
         elif parameter.implied_words:
-            name = parameter.name
-            brought = [word for word in parameter.words if word not in parameter.implied_words]
-            if brought:
-                control = _control(name, parameter.text, "choice", bsdf.get(name), None, FRESNEL)
-                yield control | {"words": brought, "optional": True, "excludes": parameter.rivals(name)}
-            for word, own in parameter.words.items():
-                # Colours of a word, η and k, cannot be alone.
-                colours = [name for name, it in own.items() if any(q.colour for q in it.quantities(pairs=False))]
-                for control in _controls(own.values(), bsdf, FRESNEL):
-                    also: Bsdf = {colour: [1.0, 1.0, 1.0] for colour in colours if colour != control["name"]}
-                    also |= {name: word} if word in brought else {}
-                    excludes = [*parameter.rivals(control["name"]), *control["excludes"]]
-                    yield control | {"optional": True, "excludes": excludes, "also": also}
+            yield from _implied(parameter, bsdf)
         elif False in parameter.words:
             name, default = parameter.names[0], parameter.fit_words[0]
             yield _control(name, parameter.text, "flag", bsdf.get(name, default), default, group)
@@ -78,6 +66,24 @@ def _controls(declared: Iterable[Parameter], bsdf: Bsdf, group: str) -> Iterator
         elif not isinstance(parameter, (File, Preset)):
             for row in parameter.rows():
                 yield _control(row.name, row.text, "text", bsdf.get(row.name), None, group)
+
+
+def _implied(parameter: Parameter, bsdf: Bsdf) -> Iterator[Control]:
+    """Yield the controls of what implies a word, and of the words of others, which their parameters need."""
+    name = parameter.name
+    if parameter.brought:
+        control = _control(name, parameter.text, "choice", bsdf.get(name), None, FRESNEL)
+        yield control | {"words": [*parameter.brought], "optional": True, "excludes": parameter.rivals(name)}
+    for word, own in parameter.words.items():
+        # Colours of a word, η and k, cannot be alone.
+        colours = [colour for colour, it in own.items() if any(q.colour for q in it.quantities(pairs=False))]
+        needed: Bsdf = {colour: [1.0, 1.0, 1.0] for colour in colours}
+        if word in parameter.brought:
+            needed[name] = word
+        for control in _controls(own.values(), bsdf, FRESNEL):
+            also = {other: value for other, value in needed.items() if other != control["name"]}
+            excludes = [*parameter.rivals(control["name"]), *control["excludes"]]
+            yield control | {"optional": True, "excludes": excludes, "also": also}
 
 
 def _spelled(parameter: Parameter, bsdf: Bsdf, group: str) -> Iterator[Control]:

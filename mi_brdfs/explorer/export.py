@@ -69,13 +69,14 @@ def page(
     for control in chain(*controls):
         if control["kind"] == "number":
             now.setdefault(control["name"], control["value"])
-    if missing := [name for name in vary or {} if name not in now]:
+    vary = vary or {}
+    if missing := [name for name in vary if name not in now]:
         raise StateError(f"{missing[0]} is no number of these BSDFs; choose {listed(now)}.")
     for control in chain(*controls):
-        if control["name"] in (vary or {}) and (rivals := (vary or {}).keys() & control["excludes"]):
+        if control["name"] in vary and (rivals := vary.keys() & control["excludes"]):
             raise StateError(f"{control['name']} and {min(rivals)} exclude each other; vary one of them.")
     state = replace(state, size=min(state.size, SIZE), dragged=bool(vary))  # lobes of many values are coarse
-    vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **(vary or {})}
+    vary = {"theta": tuple(sorted({*ANGLES, state.theta})), **vary}
     views = set(VIEWS if len(vary) == 1 else state.views)
     # Along θo, the cartesian plot has its curves from the polar one.
     is_same = state.axis == "theta_o" and not views.isdisjoint({"polar", "cartesian"})

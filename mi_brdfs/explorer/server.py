@@ -120,10 +120,11 @@ class Explorer:
         try:
             if request.content_type != "application/octet-stream":
                 raise FileError("An upload is the bytes of a file, sent as application/octet-stream.")
-            payload, number = await request.read(), next(self.numbers)
+            payload = await request.read()
             # Others may have arrived while this one was read.
             if len(list(Path(self.folder.name).iterdir())) >= UPLOADS:
                 raise FileError(f"There are {UPLOADS} uploaded files already; start the explorer anew.")
+            number = next(self.numbers)
             path = Path(self.folder.name) / f"upload-{number}{ending[0] if ending else ''}"
             path.write_bytes(payload)
             is_shown = path.suffix.lower() in (*LIGHTS, *MESHES)

@@ -64,8 +64,8 @@ def fit(
     that are declared to make a model anisotropic stay at their defaults for isotropic data. A Fresnel term has the
     parameters of ``given["fresnel"]``: "schlick" (the default), "dielectric", "conductor" or "none". Words that later
     papers added to the models of facets (f82, f90, schlick_exponent, film_thickness, film_ior, haze, haze_spread,
-    retroreflectivity) and the index outside stay as they are, unless they are given as "free". A fit of a
-    thickness has 256 starts or more, as each order of interference is a valley of its own.
+    retroreflectivity) and the index outside stay as they are, unless they are given as "free". A fit of a thickness has
+    256 starts or more, as each order of interference is a valley of its own.
 
     Half of the pairs of directions are fitted, and half held out. Fits minimise the error of a metric of
     ``mi_brdfs.fit.METRICS`` by Levenberg–Marquardt steps (:mod:`mi_brdfs.fit.solver`), from the settings that are

@@ -32,11 +32,6 @@ class FresnelSet(OneTerm):
         Parameter.__init__(self, "another Fresnel term")
 
     @property
-    def brought(self) -> tuple[str, ...]:
-        """The words that others have brought."""
-        return tuple(word for word in self.words if word not in self.implied_words)
-
-    @property
     def fit_words(self) -> tuple[str, ...]:
         # Schlick's colour can be every reflectance at normal incidence.
         return ("schlick", "dielectric", "conductor", "none", *self.brought)

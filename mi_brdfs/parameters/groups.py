@@ -72,10 +72,10 @@ class OneOf(Chosen[str]):
         return word
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
-        return SimpleNamespace(**self.own.words, **self.own.evaluate(si, active))
+        return SimpleNamespace(**self.own.evaluate(si, active))
 
     def placeholder(self) -> Any:
-        return SimpleNamespace(**self.own.words, **self.own.placeholders())
+        return SimpleNamespace(**self.own.placeholders())
 
     def rows(self) -> list[ParameterRow]:
         return self._rows(tuple(self.words), next(iter(self.words)))
@@ -109,10 +109,10 @@ class OneTerm(OneOf):
         return functools.partial(self.terms[self.word].of_values, values)
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> Any:
-        return self._made_of(self.own.words | self.own.evaluate(si, active))
+        return self._made_of(self.own.evaluate(si, active))
 
     def placeholder(self) -> Any:
-        return self._made_of(self.own.words | self.own.placeholders())
+        return self._made_of(self.own.placeholders())
 
 
 class PerLobe(Parameter):
@@ -174,10 +174,10 @@ class PerLobe(Parameter):
         return numbers
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> list[SimpleNamespace]:
-        return [SimpleNamespace(**lobe.words, **lobe.evaluate(si, active)) for lobe in self.lobes]
+        return [SimpleNamespace(**lobe.evaluate(si, active)) for lobe in self.lobes]
 
     def placeholder(self) -> list[SimpleNamespace]:
-        return [SimpleNamespace(**lobe.words, **lobe.placeholders()) for lobe in self.lobes]
+        return [SimpleNamespace(**lobe.placeholders()) for lobe in self.lobes]
 
     def rows(self) -> list[ParameterRow]:
         return [row for parameter in self.lobe("_i") for row in parameter.rows()]

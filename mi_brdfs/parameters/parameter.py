@@ -113,6 +113,11 @@ class Parameter:
         return (paired or ways or [()])[0]
 
     @property
+    def brought(self) -> tuple[Any, ...]:
+        """The words that are given, of a kind of which others are implied."""
+        return tuple(word for word in self.words if self.implied_words and word not in self.implied_words)
+
+    @property
     def fit_words(self) -> tuple[Any, ...]:
         """Its words as fits try them: the first where none is given."""
         return tuple(self.words)
@@ -199,9 +204,9 @@ class BoundParameters(dict[str, Parameter]):
             self.chosen |= bound.chosen
 
     def evaluate(self, si: mi.SurfaceInteraction3f, active: mi.Bool) -> dict[str, Any]:
-        """Return the values at a surface interaction, by declared name."""
-        return {name: parameter.evaluate(si, active) for name, parameter in self.items()}
+        """Return the values at a surface interaction, by declared name, with the ``words``."""
+        return self.words | {name: parameter.evaluate(si, active) for name, parameter in self.items()}
 
     def placeholders(self) -> dict[str, Any]:
-        """Return values that these may have, by declared name."""
-        return {name: parameter.placeholder() for name, parameter in self.items()}
+        """Return values that these may have, by declared name, with the ``words``."""
+        return self.words | {name: parameter.placeholder() for name, parameter in self.items()}
