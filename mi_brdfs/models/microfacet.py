@@ -93,7 +93,7 @@ class Microfacet(Model):
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
 
-    For F = 1 all of them conserve energy within 0.006, with ggx and beckmann, where neither α
+    For F = 1 all of them conserve energy within 0.005, with ggx and beckmann, where neither α
     exceeds 1, up to 85° and αu : αv = 8 : 1; where one reaches 2, within 0.016 (turquin within 0.05); rough blinn gains
     by itself. Beyond that facets may be up to 0.07 too dark or 0.06 too bright. Where neither α exceeds 1, the albedo
     of walk is up to 4 : 1 that of the simulated walk up to 60° (and at 80°) within 0.005 (0.015) for Schlick's

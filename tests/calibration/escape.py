@@ -24,7 +24,7 @@ import drjit as dr  # after mi_brdfs, which chooses the LLVM that they load  # i
 import mitsuba as mi  # isort: skip
 import numpy as np  # isort: skip
 
-ALPHAS, RATIOS = 36, 27
+ALPHAS, RATIOS = 43, 31
 BRIGHTER = 0.008
 """What polynomials may add to E where they err most, on facets of extreme anisotropy."""
 WALK_COSINES, WALK_ALPHAS = 15, 10
@@ -289,7 +289,12 @@ def fitted(shape: str, largest: float, ratio: float, walked: dict[str, RegularGr
         # must stay as it was.
         scale = np.minimum(1 / (1 - loss), 3)
         scale *= np.where(~stretched & (places.cos > 0.4), np.maximum(0.1 / (0.02 + loss), 1), 1)
-        polynomial = not_brighter(places.terms("lost", bend), loss, np.where(raw < -0.01, 0.1, scale))
+        # Within .3° of the horizon, correlated terms lose next to nothing: polynomials may add more than that there.
+        brighter = np.where(places.cos > 0.005, np.minimum(loss, BRIGHTER), BRIGHTER)
+        gains = raw < -0.01
+        polynomial = not_brighter(
+            places.terms("lost", bend), loss, np.where(gains, 0.1, scale), np.where(gains, np.inf, brighter)
+        )
         means, *later = after_the_first(walked, above, everywhere, lost_at(everywhere, polynomial, bend))
         # What they colour is to err less up to some 60° than near the horizon.
         weights = (0.02 + lost_at(above, polynomial, bend)) * np.where(above.cos > 0.4, 3, 1)
@@ -312,10 +317,9 @@ def chebyshev(count: int) -> np.ndarray:
     return (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
 
 
-def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray, brighter: np.ndarray) -> np.ndarray:
     """Return the coefficients with the least largest error in some scale, of 16 bits: the mean that the lobe is divided
-    by must be that of what is looked up. They are lowered to where they add at most BRIGHTER light, and no more than
-    is lost, besides where the scale is below 1."""
+    by must be that of what is looked up. They are lowered to where they add no more light than ``brighter``."""
     weights, best, least = np.ones(len(loss)), np.zeros(terms.shape[1]), np.inf
     for _ in range(25):
         k = np.linalg.lstsq(terms * (weights * scale)[:, None], loss * weights * scale, rcond=None)[0]
@@ -325,7 +329,7 @@ def not_brighter(terms: np.ndarray, loss: np.ndarray, scale: np.ndarray) -> np.n
         weights *= np.sqrt(0.3 + error / error.mean())
         weights /= weights.mean()
     best = best.astype(np.float16).astype(float)
-    excess = (terms @ best - loss - np.minimum(loss, BRIGHTER))[scale >= 1].max()
+    excess = (terms @ best - loss - brighter).max()
     if excess > 0:
         best[0] = np.nextafter(np.float16(best[0] - excess), np.float16(-1))
     return best
