@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -134,6 +134,13 @@ def numbers(value: Any, count: int | None = None) -> Array:
     if array.ndim < 2:
         array = array.reshape((-1, 1) if is_scalar() else (1, -1))
     return array.T if count is None else np.broadcast_to(array, (len(array), count)).T
+
+
+def all_numbers(values: Iterable[Any], count: int) -> list[Array]:
+    """Return :func:`numbers` of several values that share most of their code, which one kernel computes."""
+    values = list(values)
+    dr.eval(values)
+    return [numbers(value, count) for value in values]
 
 
 def luminance(colours: Array) -> Array:

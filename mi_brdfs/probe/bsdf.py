@@ -17,6 +17,7 @@ from .arrays import (
     CENTRE,
     WAVELENGTHS,
     Array,
+    all_numbers,
     context,
     hero_wavelengths,
     interaction,
@@ -246,9 +247,7 @@ class BSDFProbe:
         wo = dr.select(drawn, bs.wo, mi.Vector3f(0, 0, 1))
         value, pdf = self.bsdf.eval(part.context, si, wo, True), self.bsdf.pdf(part.context, si, wo, True)
         scalars = bs.pdf, bs.sampled_component, bs.sampled_type, bs.eta, dr.select(drawn, pdf, 0), self.is_smooth(bs)
-        fields = (wo, weight, value, *scalars)
-        dr.eval(fields)
-        wo, weight, value, *columns = (numbers(field, count) for field in fields)
+        wo, weight, value, *columns = all_numbers((wo, weight, value, *scalars), count)
         density, component, kind, eta, pdf, smooth = (column[:, 0] for column in columns)
         return Samples(wo.astype(np.float32), weight, density, component, kind, eta, value, pdf, smooth > 0)
 

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..mitsuba.errors import unwrapped_ctrl_c
-from ..probe.arrays import Array, context, interaction, numbers, sample_arguments, vectors
+from ..probe.arrays import Array, all_numbers, context, interaction, numbers, sample_arguments, vectors
 from ..probe.bsdf import BSDFProbe, Part
 from ..probe.directions import beside, hemisphere, on_side, scattered
 from ..probe.variates import random
@@ -82,9 +82,8 @@ def _results(probe: BSDFProbe, wi: Array, wo: Array, u: Array, mask: bool | mi.B
         "the weight of eval_pdf_sample": dr.select(stops(also[2]), also[3], 0),
         "the density of eval_pdf_sample": also[2].pdf,
     }
-    dr.eval(found)
     reflectance = {"eval_diffuse_reflectance": probe.diffuse_reflectance(wi, active=given())}
-    return {name: numbers(value, len(wo)) for name, value in found.items()} | reflectance
+    return dict(zip(found, all_numbers(found.values(), len(wo)), strict=True)) | reflectance
 
 
 def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Array) -> None:
@@ -99,7 +98,7 @@ def _check_derivatives(run: Run, outcome: Outcome, wi: Array, wo: Array, lit: Ar
         value = run.probe.bsdf.eval(run.probe.whole.context, interaction(wi), vectors(wo), mask)
         value = dr.select(mi.Bool(counted), value, 0)
         if dr.grad_enabled(value):
-            dr.backward(dr.sum(value, axis=None))
+            dr.backward(value)
         return [gradient(each) for each in attached], float(np.sum(np.array(dr.detach(value), np.float64)))
 
     with ExitStack() as stack:
@@ -199,7 +198,7 @@ def recorded(run: Run, part: Part, outcome: Outcome) -> str:
     in Python, or to take a mean over the lanes. And as renderers call them, by a pointer and for one lane, they return
     the same, to float32's rounding, for 99 in a hundred."""
     wi, wo, variates = scattered(COUNT, 68, part.sides), scattered(COUNT, 69, part.sides), random(COUNT, 70)
-    rendered = _methods(mi.BSDFPtr(run.probe.bsdf), part.context)
+    rendered, returned = _methods(mi.BSDFPtr(run.probe.bsdf), part.context), list[tuple[str, Any, Any]]()
     for name, call in _methods(run.probe.bsdf, part.context).items():
         si, *others = interaction(wi), vectors(wo), *sample_arguments(variates)
         dr.eval(call(si, *others))  # what it prepares once
@@ -210,10 +209,12 @@ def recorded(run: Run, part: Part, outcome: Outcome) -> str:
             if dr.kernel_history([dr.KernelType.JIT, dr.KernelType.BlockReduce]):
                 outcome.fault(f"{name} asks for the values of an array, so that no renderer can record it in a loop")
                 continue
-        for got, expected in zip(_flat(rendered[name](si, *others)), _flat(usual), strict=True):
-            pair = numbers(got, COUNT), numbers(expected, COUNT)
-            tolerance, words = 10 * run.rounding(part), f"recorded, as renderers call it, what {name} returns"
-            outcome.differing(tolerance, words, *pair, "else", wi, wo, floor=1e-3, but_for=0.01, seed=70)
+        pairs = zip(_flat(rendered[name](si, *others)), _flat(usual), strict=True)
+        returned += [(name, got, expected) for got, expected in pairs]
+    found = iter(all_numbers((each for _, *pair in returned for each in pair), COUNT))
+    for (name, *_), got, expected in zip(returned, found, found, strict=True):
+        tolerance, words = 10 * run.rounding(part), f"recorded, as renderers call it, what {name} returns"
+        outcome.differing(tolerance, words, got, expected, "else", wi, wo, floor=1e-3, but_for=0.01, seed=70)
     return "It asks for no values of arrays, and returns the same if it is recorded."
 
 

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import Array, interaction, numbers, vectors
+from ..probe.arrays import Array, all_numbers, interaction, numbers, vectors
 from ..probe.directions import beside
 from .differences import differences
 from .outcome import Outcome
@@ -33,9 +33,8 @@ def directional(run: Run, pairs: Pairs | None) -> Finding:
         result = method(part.context, si, towards, True)
         if not dr.grad_enabled(result):
             continue
-        dr.backward(dr.sum(result, axis=None))
-        for word, derivative in (("wi", dr.grad(si.wi)), ("wo", dr.grad(towards))):
-            found = numbers(derivative, len(wi))
+        dr.backward(result)
+        for word, found in zip(("wi", "wo"), all_numbers(map(dr.grad, (si.wi, towards)), len(wi)), strict=True):
             bad = np.logical_not(np.isfinite(found).all(axis=1))
             why = f"as of {bad.mean():.1%} of the pairs tried"
             outcome.wrong(bad, f"the derivative of {name} for {word}", found, why, wi, wo)

@@ -51,9 +51,9 @@ def edges_of(part: Part) -> Pairs:
 
 
 def differentiate_sum(values: Any, pairs: Pairs) -> None:
-    """Differentiate the weighted sum of values."""
+    """Differentiate the weighted sum of values, without the sum itself, which would be a kernel of its own."""
     weights = mi.UnpolarizedSpectrum(np.float32(pairs.weights.T))
-    dr.backward(dr.sum(mi.unpolarized_spectrum(values) * weights, axis=None))
+    dr.backward(mi.unpolarized_spectrum(values) * weights)
 
 
 def light_of(run: Run, pairs: Pairs) -> float:
