@@ -191,15 +191,17 @@ def test_one_of_several_factors_at_their_ends_goes_inwards(name, step):
 @pytest.mark.parametrize(
     "given, name, step",
     [
-        ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.5}, "alpha_u", 1e-3),
-        ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.5}, "alpha_v", -1e-3),
-        ({"type": "burley", "roughness": 0.9, "metallic": 1, "anisotropic": 0}, "anisotropic", 1e-3),
+        ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.5}, "alpha_u", 2e-3),
+        ({"type": "walter", "alpha_u": 0.5, "alpha_v": 0.5}, "alpha_v", -2e-3),
+        ({"type": "burley", "roughness": 0.9, "metallic": 1, "anisotropic": 0}, "anisotropic", 4e-3),
     ],
 )
 def test_where_both_roughnesses_are_the_same_derivatives_are_those_of_one_side(given, name, step, way):
-    """Of facets that are stretched along dp_du, as Burley's are if they are: so they are in what facets lose, too."""
-    gradient, expected = one_sided(given | {"multiscatter": way}, name, step)
-    assert gradient == pytest.approx(expected, rel=0.02)
+    """Of facets that are stretched along dp_du, as Burley's are if they are: so they are in what facets lose, too. That
+    nearly makes up for what the lobe changes by, but not for its curvature: differences leave out the second order."""
+    given = given | {"multiscatter": way}
+    (gradient, near), (_, far) = one_sided(given, name, step), one_sided(given, name, 2 * step)
+    assert gradient == pytest.approx(2 * near - far, rel=0.02)
 
 
 @pytest.mark.parametrize("way", ["walk", "kulla-conty"])
