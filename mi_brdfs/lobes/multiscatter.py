@@ -10,6 +10,7 @@ import mitsuba as mi
 
 from ..math import EPSILON, Spectrum, safe_sqrt
 from ..microfacet.escape import Escape, MeanEscape, Walks, table
+from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Smith
 from ..microfacet.terms import Fresnel
 from .lobe import Lobe, WeightedLobe
@@ -69,27 +70,31 @@ class WalkLobe(MultipleScattering):
     and escapes at the second reflection with probability p, later with q:
 
         C = ρ R(wi) R(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
-        R = (F₁ + F̄₁)² / (4 F̄₁)
+        R = F̄₁ ((1 + F₁/F̄₁)/2)²
 
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁(w) is F̄₁ and what F
     differs by from its means both at the first and at a later reflection of light from w. On facets that are seen at
     grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about
-    R(wi) times the mean of R(wo). Of an F that nearly vanishes on the mean, R is at most twice the larger of both.
+    R(wi) times the mean of R(wo).
     """
 
     MOST = 1.25
     """The largest F₁: beside an F̄₁ of nearly 1 it is more than 1 in some directions, so that the mean of R is right."""
+    MOST_OF_MEAN = 6
+    """The largest F₁ over F̄₁, of an F that nearly vanishes on the mean."""
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         mean = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip)
         between, third = Fresnel.mean(self.fresnel, *self.mean.between), self.mean.third
         later = between * third / (1 - between * (1 - third))
-        return mean, 0.25 / dr.maximum(mean, EPSILON), reflectance * later, reflectance * (1 - later)
+        reflectance, half = reflectance * dr.square(mean), 0.5 / dr.maximum(mean, EPSILON)
+        normal, *others = self.fresnel
+        most = 0.5 + dr.minimum(self.MOST * half, 0.5 * self.MOST_OF_MEAN)
+        return reflectance * later, reflectance * (1 - later), most, 0.5 + normal * half, *(it * half for it in others)
 
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        mean, scale, later, sooner = self.colours
-        own = (Fresnel.mean(self.fresnel, end.schlick, end.dip, self.MOST) for end in (i, o))
-        first, last = (dr.minimum(dr.square(f + mean) * scale, 2 * dr.maximum(f, mean)) for f in own)
+        later, sooner, most, *root = self.colours  # of R over F̄₁
+        first, last = (dr.square(Fresnel.mean(root, end.schlick, end.dip, most)) for end in (i, o))
         return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
 
 
@@ -145,4 +150,6 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     walks = Walks(smith, model.captured[0], uniform)
     if way == "turquin":
         return (turquin(lobe, walks),)
-    return lobe, (WalkLobe if way == "walk" else KullaContyLobe)(lobe, walks, uniform)
+    # Where F = 1, both colours are ρ, and the series takes less time.
+    walked = way == "walk" and not isinstance(lobe.fresnel, Unit)
+    return lobe, (WalkLobe if walked else KullaContyLobe)(lobe, walks, uniform)

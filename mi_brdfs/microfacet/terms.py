@@ -160,12 +160,12 @@ class Fresnel(Term):
         return normal, rise, -raised
 
     @staticmethod
-    def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any, most: float = 1) -> Spectrum:
+    def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any, most: Any = 1) -> Spectrum:
         """Return the mean reflectance, up to ``most``, of facets over which (1 - cosθ)⁵ has the mean ``schlick``, and
         cosθ (1 - cosθ)⁶ the mean ``dip``."""
         normal, rise, *below = combination
         mean = normal + rise * schlick
-        return dr.clip(mean - below[0] * dip, 0, most) if below else dr.maximum(mean, 0)
+        return dr.clip(mean - below[0] * dip if below else mean, 0, most)
 
     def mueller(self, cos: mi.Float) -> tuple[Spectrum, ...] | None:
         """Return ``(F, B, C, S)``, of which a facet's Mueller matrix consists if Stokes vectors have their first axis
