@@ -206,6 +206,8 @@ class Conductor(Interface):
         normal = (dr.square(self.eta - 1) + k2) / (dr.square(self.eta + 1) + k2)
         return dr.maximum(Conductor(luminance(self.eta), luminance(self.k))(cos), 0.5 * luminance(normal))
 
+    estimate = brightness  # which chooses lobes as well as three channels do
+
 
 class NamedConductor(Conductor):
     """One of Mitsuba's conductors."""
