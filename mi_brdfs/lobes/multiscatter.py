@@ -89,7 +89,7 @@ class WalkLobe(MultipleScattering):
         later = between * third / (1 - between * (1 - third))
         reflectance, half = reflectance * dr.square(mean), 0.5 / dr.maximum(mean, EPSILON)
         normal, *others = self.fresnel
-        most = 0.5 + dr.minimum(self.MOST * half, 0.5 * self.MOST_OF_MEAN)
+        most = 0.5 + dr.minimum(self.MOST, self.MOST_OF_MEAN * mean) * half
         return reflectance * later, reflectance * (1 - later), most, 0.5 + normal * half, *(it * half for it in others)
 
     def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:

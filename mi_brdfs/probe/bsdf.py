@@ -207,12 +207,12 @@ class BSDFProbe:
         """Return these at surface points, for which :attr:`data` does not count."""
         count, ctx, towards = len(wo), self.whole.context, vectors(wo)
         whole = self.bsdf.eval(ctx, si, towards, True), self.bsdf.eval_pdf(ctx, si, towards, True)[0]
-        dr.eval(whole)
-        found = [Value(name, wo, value) for name, value in zip(("eval", "eval_pdf's value"), whole, strict=True)]
+        names = "eval", "eval_pdf's value"
+        found = [Value(name, wo, value) for name, value in zip(names, all_numbers(whole, count), strict=True)]
         for part in self.deltas:
             bs, weight = self.bsdf.sample(part.context, si, *sample_arguments(random(count, 83)), True)
-            found.append(Value(f"a sample's weight of {part.name}", numbers(bs.wo, count), weight))
-        return [each._replace(value=numbers(each.value, count)) for each in found]
+            found.append(Value(f"a sample's weight of {part.name}", *(numbers(it, count) for it in (bs.wo, weight))))
+        return found
 
     def pdf(self, part: Part, wi: Array, wo: Array, uv: ArrayLike = CENTRE) -> Array:
         """Return the density of ``wo``."""
