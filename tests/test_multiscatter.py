@@ -129,7 +129,7 @@ def test_nor_far_from_it_where_little_is_reflected_or_nearly_all(alpha, distribu
     for k, (f0, f82, f90) in enumerate(tints):
         ours = albedos(facets("walk", alpha, distribution, f0=f0, f82=f82, f90=f90), angles, 90)[:, 0]
         for albedo, theta, (energy, error) in zip(ours, angles, walks, strict=True):
-            far = (0.012 if f82 < 0.5 else 0.007) if theta <= 60 else 0.015
+            far = (0.01 if f82 < 0.5 else 0.007) if theta <= 60 else 0.013
             noise = 3 * np.sqrt((error[:, k] ** 2).sum())
             assert abs(albedo - energy[:, k].sum()) < far + noise, (f0, f82, f90, theta)
 

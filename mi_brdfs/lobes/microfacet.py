@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import drjit as dr
 import mitsuba as mi
 
@@ -38,6 +40,8 @@ class MicrofacetLobe(Lobe):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
+        self.tabulated: Callable[[mi.Vector3f], Spectrum] | None = None
+        """What takes the place of the fitted estimate of its albedo, if there are tables."""
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         """Return an estimate from F, D and G at a typical facet.
@@ -47,6 +51,8 @@ class MicrofacetLobe(Lobe):
         facet and its image about the normal add up to 2 cosθ_h cosθ_i, until at grazing angles only the first one is
         visible.
         """
+        if self.tabulated:
+            return self.tabulated(wi)
         cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
         sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, EPSILON)
         slope2 = self.distribution.mean_square_slope_along(wi) / sin2

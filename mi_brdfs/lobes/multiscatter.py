@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..math import EPSILON, Spectrum, safe_sqrt
-from ..microfacet.escape import Escape, MeanEscape, Walks, table
+from ..math import EPSILON, Spectrum, luminance, safe_sqrt
+from ..microfacet.escape import Escape, Walks, table
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Smith
 from ..microfacet.terms import Fresnel
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
+
+HEMISPHERE = 1 / 21, 1 / 126
+"""The means of (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶ over a hemisphere, times cosθ."""
 
 
 class MultipleScattering(Lobe):
@@ -36,18 +40,32 @@ class MultipleScattering(Lobe):
         lost = dr.maximum(self.mean.lost, EPSILON)
         b = self.GRAZING * lost * dr.sqrt(lost)
         self.b, self.norm, self.scale = uniform("lobe", (b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost))
+        self.bright = uniform("brightness", tuple(luminance(it) for it in self.fresnel))
+        self.reflectance, lobe.tabulated = lobe.reflectance, self.lobe_albedo
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         """Return what of the colour is the same for all directions."""
         raise NotImplementedError(f"{type(self).__name__} does not define between.")
 
-    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        """Return C for what becomes of light from both directions, or of the mean one; it is ρ if F is 1."""
+    def colour(self, i: Escape, o: Escape | None = None) -> Spectrum:
+        """Return C for what becomes of light from both directions, or without the other one an estimate of its mean; it
+        is ρ if F is 1."""
         raise NotImplementedError(f"{type(self).__name__} does not define colour.")
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         i = self.walks.of(wi)
-        return self.colour(i, self.mean) * i.lost
+        return self.colour(i) * i.lost
+
+    def lobe_albedo(self, wi: mi.Vector3f) -> Spectrum:
+        """Return an estimate of the albedo of the lobe itself, from F at a typical facet: at grazing angles those count
+        that lean towards ``wi``."""
+        typical = dr.minimum(wi.z + (self.walks.smith.length(wi) - wi.z) * (1 - wi.z), 1)
+        m2 = dr.square(1 - typical)
+        m5 = m2 * m2 * (1 - typical)
+        fresnel = Fresnel.mean(self.bright, m5, typical * (1 - typical) * m5)
+        # It may vanish at one angle.
+        least = 0.25 * Fresnel.mean(self.bright, *HEMISPHERE)
+        return self.reflectance * ((1 - self.walks.of(wi).lost) * dr.maximum(fresnel, least))
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return 0  # as mirrors, facets lose nothing
@@ -70,32 +88,31 @@ class WalkLobe(MultipleScattering):
     and escapes at the second reflection with probability p, later with q:
 
         C = ρ R(wi) R(wo) (p + (1 - p) L),  L = F₂ q / (1 - F₂ (1 - q)),  p = p(wi) + p(wo) - p̄
-        R = F̄₁ ((1 + F₁/F̄₁)/2)²
+        R = F̄₁ s (2 + s)/3,  s = (1 + 3 F₁/F̄₁)/4
 
     p̄ is the mean of p(wo) under the lobe: so the mean of p over wo is p(wi), as in the walk. F₁(w) is F̄₁ and what F
-    differs by from its means both at the first and at a later reflection of light from w. On facets that are seen at
-    grazing angles again and again both differ alike: the product of the two is then ((F₁ + F̄₁)/2)², which is about
-    R(wi) times the mean of R(wo).
+    differs by from its means both at the first and at a later reflection of light from w. The product of the two, which
+    is about R(wi) times the mean of R(wo), is ((F₁ + F̄₁)/2)² if both differ alike, as on facets that are seen at
+    grazing angles again and again, and F₁ F̄₁ if one does. R is three quarters of the first and a quarter of the second.
     """
 
-    MOST = 1.25
-    """The largest F₁: beside an F̄₁ of nearly 1 it is more than 1 in some directions, so that the mean of R is right."""
-    MOST_OF_MEAN = 6
-    """The largest F₁ over F̄₁, of an F that nearly vanishes on the mean."""
+    MOST = 5
+    """The largest s, of an F that nearly vanishes on the mean."""
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         mean = Fresnel.mean(self.fresnel, self.mean.schlick, self.mean.dip)
         between, third = Fresnel.mean(self.fresnel, *self.mean.between), self.mean.third
         later = between * third / (1 - between * (1 - third))
-        reflectance, half = reflectance * dr.square(mean), 0.5 / dr.maximum(mean, EPSILON)
+        reflectance, scale = reflectance * dr.square(mean), 0.75 / dr.maximum(mean, EPSILON)
         normal, *others = self.fresnel
-        most = 0.5 + dr.minimum(self.MOST, self.MOST_OF_MEAN * mean) * half
-        return reflectance * later, reflectance * (1 - later), most, 0.5 + normal * half, *(it * half for it in others)
+        return reflectance * later, reflectance * (1 - later), 0.25 + normal * scale, *(it * scale for it in others)
 
-    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
-        later, sooner, most, *root = self.colours  # of R over F̄₁
-        first, last = (dr.square(Fresnel.mean(root, end.schlick, end.dip, most)) for end in (i, o))
-        return first * last * (later + dr.maximum(i.second + o.second, 0) * sooner)
+    def colour(self, i: Escape, o: Escape | None = None) -> Spectrum:
+        later, sooner, *of_s = self.colours
+        ends = [i] if o is None else [i, o]
+        each = (Fresnel.mean(of_s, end.schlick, end.dip, self.MOST) for end in ends)
+        second = 1 if o is None else dr.maximum(i.second + o.second, 0)
+        return math.prod(s * (2 + s) / 3 for s in each) * (later + second * sooner)
 
 
 class KullaContyLobe(MultipleScattering):
@@ -103,10 +120,10 @@ class KullaContyLobe(MultipleScattering):
     C = ρ F̄² Ē / (1 - F̄ (1 - Ē))."""
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
-        mean, lost = Fresnel.mean(self.fresnel, 1 / 21, 1 / 126), self.mean.lost
+        mean, lost = Fresnel.mean(self.fresnel, *HEMISPHERE), self.mean.lost
         return (reflectance * mean * mean * (1 - lost) / (1 - mean * lost),)
 
-    def colour(self, i: Escape | MeanEscape, o: Escape | MeanEscape) -> Spectrum:
+    def colour(self, i: Escape, o: Escape | None = None) -> Spectrum:
         return self.colours[0]
 
 

@@ -38,7 +38,7 @@ BENDS = {"ggx": ((5, 4), (3, 8)), "beckmann": ((6, 4), (6, 4)), "blinn": ((3, 8)
 """Numbers c and d of k = c/(1 + d (αu² + αv²)/2), for the separable and the correlated term, by which polynomials of
 low degree do."""
 COUNTS = {
-    "lost": (7, 5, 3), "root": (1,), "second": (4, 2), "schlick": (4, 2), "means": (3,), "dip": (4, 2),
+    "lost": (7, 5, 3), "root": (1,), "second": (3, 2), "schlick": (4, 2), "means": (3,), "dip": (4, 2),
     "mean dips": (2,),
 }  # fmt: skip
 """How many entries the table has: for each polynomial, the coefficients of those by which 1, y, y² … are multiplied, in
@@ -74,11 +74,6 @@ class MeanEscape(NamedTuple):
     between: tuple[mi.Float, mi.Float]
     """The means of both at reflections between the first and the last."""
 
-    @property
-    def second(self) -> mi.Float:
-        """About half of the part that escapes at the second, for estimates."""
-        return 0.5 * self.third
-
 
 class Walks:
     """What the :func:`table` says of walks on a surface with Smith's term."""
@@ -93,7 +88,7 @@ class Walks:
             at.append((1 - 1e-6) * dr.sqrt(dr.sqrt(smallest / largest)))  # … and not 0, as beyond the last texel
         most, falling = BENDS[smith.facets][smith.correlated]
         bend = most * dr.rcp(1 + 0.5 * falling * (u * u + v * v))
-        self.bend, self.inverse = uniform("bend", (bend, dr.rcp(u * v)))
+        (self.bend,) = uniform("bend", (bend,))
         # Outer texels have their centres at 0 and 1.
         texels = [(x * (count - 1) + 0.5) / count for x, count in zip(at, table.shape[-2::-1], strict=True)]
         self.rows, left = {}, iter(uniform("walks", table.eval(texels)))
@@ -104,16 +99,15 @@ class Walks:
 
     def of(self, v: mi.Vector3f) -> Escape:
         """Return what becomes of light from a direction."""
-        slope2 = self.smith.slope2(v)
-        bent = v.z + self.bend * (dr.sqrt(slope2 + v.z * v.z) - v.z)
+        bent = v.z + self.bend * (self.smith.length(v) - v.z)
         if self.isotropic:
             x, y = 2 * v.z * dr.rcp(bent) - 1, 0
         else:
             # Towards the normal, which has no azimuth, y goes to 0. Both variables take one division.
-            along, sin2 = slope2 * self.inverse, v.x * v.x + v.y * v.y
-            divisor = (along + SKEW * sin2 + UPRIGHT) * (sin2 + UPRIGHT)
+            along2, sin2, mean2 = self.smith.slope2(v), v.x * v.x + v.y * v.y, self.smith.alpha_u * self.smith.alpha_v
+            divisor = (along2 + mean2 * (SKEW * sin2 + UPRIGHT)) * (sin2 + UPRIGHT)
             inverse = dr.rcp(bent * divisor)
-            x, y = 2 * v.z * (divisor * inverse) - 1, (along - sin2) * sin2 * (bent * inverse)
+            x, y = 2 * v.z * (divisor * inverse) - 1, (along2 - mean2 * sin2) * sin2 * (bent * inverse)
         lost = horner([horner(row, x) for row in self.rows["lost"]], y)
         # The others change with the angle itself, and at the normal not with the azimuth.
         versine, others = 1 - v.z, []

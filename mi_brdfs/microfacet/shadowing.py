@@ -88,6 +88,10 @@ class Smith(Shadowing):
         """Return (αu v_x)² + (αv v_y)²."""
         return dr.square(self.alpha_u * v.x) + dr.square(self.alpha_v * v.y)
 
+    def length(self, v: mi.Vector3f) -> mi.Float:
+        """Return √((αu v_x)² + (αv v_y)² + v_z²), the length of v in the space stretched by α."""
+        return dr.sqrt(self.slope2(v) + v.z * v.z)
+
     def stretched(self, v: mi.Vector3f) -> mi.Float:
         """Return v_z (1 + 2Λ(v)), which stays finite at the horizon."""
         raise NotImplementedError
@@ -105,8 +109,7 @@ class SmithGGX(Smith):
 
     facets = "ggx"
 
-    def stretched(self, v: mi.Vector3f) -> mi.Float:
-        return dr.sqrt(self.slope2(v) + v.z * v.z)
+    stretched = Smith.length
 
 
 class SmithBeckmann(Smith):

@@ -84,12 +84,12 @@ class Microfacet(Model):
     * none: it is lost
     * walk: a second lobe returns it, ρs C (1-E(wi)) (1-E(wo)) / (π (1-Ē)), where E(w) is the albedo for F = 1 and Ē its
       mean. Its colour C is that of a random walk on the surface (Heitz, Hanika, d'Eon and Dachsbacher 2016,
-      doi:10.1145/2897824.2925943), C = R(wi) R(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), R = F̄₁ ((1 + F₁/F̄₁)/2)²,
-      with tabulated means F₁ and F₂ at the ends of a path and between them, of F or the nearest to it of Schlick's with
-      an f82, and probabilities p and q that light escapes at its second reflection and at each later one; F̄₁ is the
-      mean of F₁ over directions, F₁ at most 6 F̄₁, and p = p(wi) + p(wo) - p̄, so that f is reciprocal. The walk's
-      first reflection has the height-correlated term, and so has f for ggx, also with smith; for the others it hardly
-      matters
+      doi:10.1145/2897824.2925943), C = R(wi) R(wo) (p + (1-p) F₂ q/(1-F₂ (1-q))), R = F̄₁ s (2+s)/3 with
+      s = (1 + 3 F₁/F̄₁)/4 up to 5, and with tabulated means F₁ and F₂ at the ends of a path and between them, of F or
+      the nearest to it of Schlick's with an f82, and probabilities p and q that light escapes at its second reflection
+      and at each later one; F̄₁ is the mean of F₁ over directions, and p = p(wi) + p(wo) - p̄, so that f is
+      reciprocal. The walk's first reflection has the height-correlated term, and so has f for ggx, also with smith; for
+      the others it hardly matters
     * kulla-conty: the same with C = F̄² Ē/(1-F̄ (1-Ē)), F̄ = 2 ∫ F cosθ dcosθ (Kulla and Conty 2017)
     * turquin: f is scaled by 1 + F(1) (1-E(wi))/E(wi) (Turquin 2019). Not reciprocal
 
@@ -97,14 +97,14 @@ class Microfacet(Model):
     αu : αv = 8 : 1; where one reaches 2, within 0.016 (turquin within 0.05); rough blinn gains by itself. Beyond that
     facets may be up to 0.07 too dark or 0.06 too bright. Where neither α exceeds 1, the albedo of walk is up to 4 : 1
     that of the simulated walk up to 60° (and at 80°) within 0.005 (0.015) for Schlick's reflectance with an exponent of
-    5 or more (0.008 with an f82 of 0.5 or more, 0.012 with a smaller one), and for dielectrics and metals (0.007 where
+    5 or more (0.007 with an f82 of 0.5 or more, 0.016 with a smaller one), and for dielectrics and metals (0.007 where
     η < 1 <= k, 0.065 where both are less); within 0.03 for smaller exponents, and for films in rgb; and within 0.14
-    (0.075 where αu = αv) where light is reflected totally, for ``int_ior`` < ``ext_ior``. At 8 : 1 that of metals is
-    within 0.006 (0.01). Where one α reaches 2, up to 4 : 1 and 80°, that of all these is within 0.035, but 0.09 for
-    metals with η and k below 1 and for smaller exponents with f90 < f0, and 0.17 where light is reflected totally. The
-    published ways are farther off: for Schlick's reflectance the albedo of kulla-conty is up to 0.045 too low (0.06),
-    or with an f82 or f90 below 1 up to 0.16 too high (0.19), and that of turquin up to 0.06 too high and 0.03 too low
-    (0.05), or up to 0.29 too high.
+    where light is reflected totally, for ``int_ior`` < ``ext_ior``. At 8 : 1 that of metals is within 0.006 (0.01).
+    Where one α reaches 2, up to 4 : 1 and 80°, that of all these is within 0.035, but 0.09 for metals with η and k
+    below 1 and for smaller exponents with f90 < f0, and 0.17 where light is reflected totally. The published ways are
+    farther off: for Schlick's reflectance the albedo of kulla-conty is up to 0.045 too low (0.06), or with an f82 or
+    f90 below 1 up to 0.16 too high (0.19), and that of turquin up to 0.06 too high and 0.03 too low (0.05), or up to
+    0.29 too high.
 
     Other plugins are combinations of this kit: ``cooktorrance`` (beckmann, ggx or blinn with vcavity), ``walter`` (ggx
     with smith), ``ward`` (beckmann with kelemen, for variant balanced), ``kurt`` (beckmann with kurt), ``nishino``
