@@ -39,6 +39,8 @@ REJECTED = [
     ("microfacet", {"distribution": "abc"}, 'shadowing = "smith" is not known for distribution = "abc"; take it with beckmann, ggx or blinn,'),
     ("microfacet", {"distribution": "hepd", "shadowing": "schlick"}, 'shadowing = "schlick" is not known for distribution = "hepd"; take it with'),
     ("walter", {"f82": 0.5}, "f82 needs f0 beside it"),
+    ("walter", {"material": "Au", "film_ior": 1.5}, "walter: film_ior needs film_thickness beside it."),
+    ("burley", {"haze_spread": 0.5}, "burley: haze_spread needs haze beside it."),
     ("walter", {"material": "Au", "f90": 0.5}, "excludes f90"),
     ("walter", {"f0": 0.5, "film_thickness": 300.0}, "film_thickness needs a conductor or a dielectric beside it; give eta and k"),
     ("microfacet", {"distribution": "abc", "shadowing": "vcavity", "haze": 0.5}, 'haze is not known for distribution = "abc"; take it with'),

@@ -19,8 +19,9 @@ from .multiscatter import multiscattering
 HAZE = Number(None, (0, 1), "share of a second, wider lobe of the facets; omitted by default", sought=False)
 SPREAD = 0.5
 HAZE_SPREAD = Number(
-    None, (0, 1), f"how wide that is: from the first one's roughness √α (0) to 1; {SPREAD} if omitted", sought=False
-)
+    None, (0, 1), f"how wide that is: from the first one's roughness √α (0) to 1; {SPREAD} if omitted",
+    sought=False, beside="haze",
+)  # fmt: skip
 RETROREFLECTIVITY = Number(
     None, (0, 1), "share of the light of the facets that goes back where it came from; omitted by default", sought=False
 )

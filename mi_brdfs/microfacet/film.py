@@ -40,7 +40,9 @@ INDEX = 1.4
 FILM_THICKNESS = Thickness(
     None, (0, 2000), "thickness in nm of a film on the conductor or dielectric; omitted by default", sought=False
 )
-FILM_IOR = Number(None, (1, 4), f"index of refraction of that film; {INDEX} if omitted", sought=False)
+FILM_IOR = Number(
+    None, (1, 4), f"index of refraction of that film; {INDEX} if omitted", sought=False, beside="film_thickness"
+)
 
 
 def filmed(model: Any, p: Any) -> Fresnel:

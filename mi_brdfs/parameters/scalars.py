@@ -30,8 +30,8 @@ class Number(Parameter):
     object twice where it was given alone; with ``lone_default``, one of the pair alone leaves the other at the default.
     Another one that makes a model anisotropic says what it is in isotropic materials, ``isotropic_as`` a parameter or
     "", its default. One with another ``spelling`` may be given as that instead. Without a default it is None where it
-    is not given. Fits leave one that is not ``sought`` as it is, unless asked for it, and so do searches for the
-    largest albedo.
+    is not given; it may mean nothing unless the parameter ``beside`` it is given. Fits leave one that is not ``sought``
+    as it is, unless asked for it, and so do searches for the largest albedo.
     """
 
     def __init__(
@@ -46,9 +46,10 @@ class Number(Parameter):
         spelling: Spelling | None = None,
         role: str | None = None,
         sought: bool = True,
+        beside: str | None = None,
     ):
         super().__init__(text)
-        self.role, self.sought = role, sought
+        self.role, self.sought, self.beside = role, sought, beside
         self.default, self.limits, self.spelling = default, limits, spelling
         self.anisotropic, self.lone_default, self.isotropic_as = anisotropic, lone_default, isotropic_as
         self.scale = 1.0
@@ -97,6 +98,8 @@ class Number(Parameter):
         single, given = self.names[0], [name for name in self.pair if name in reader]
         if self.default is None and not any(name in reader for name in self.names):
             return self.replace()
+        if self.beside and self.beside + self.number not in reader:
+            raise reader.error(single, f"needs {self.beside}{self.number} beside it")
         if self.spelling and self.other in reader:
             if single in reader:
                 raise reader.error(single, f"excludes {self.other}; give either {single} or {self.other}")
