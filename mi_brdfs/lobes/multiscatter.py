@@ -44,13 +44,12 @@ class MultipleScattering(Lobe):
         self.reflectance, lobe.tabulated = lobe.reflectance, self.lobe_albedo
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
-        """Return what of the colour is the same for all directions."""
-        raise NotImplementedError(f"{type(self).__name__} does not define between.")
+        """Return what of the colour is the same for all directions: by default all of it, ρ, as for F = 1."""
+        return (reflectance,)
 
     def colour(self, i: Escape, o: Escape | None = None) -> Spectrum:
-        """Return C for what becomes of light from both directions, or without the other one an estimate of its mean; it
-        is ρ if F is 1."""
-        raise NotImplementedError(f"{type(self).__name__} does not define colour.")
+        """Return C for what becomes of light from both directions, or without the other one an estimate of its mean."""
+        return self.colours[0]
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         i = self.walks.of(wi)
@@ -123,9 +122,6 @@ class KullaContyLobe(MultipleScattering):
         mean, lost = Fresnel.mean(self.fresnel, *HEMISPHERE), self.mean.lost
         return (reflectance * mean * mean * (1 - lost) / (1 - mean * lost),)
 
-    def colour(self, i: Escape, o: Escape | None = None) -> Spectrum:
-        return self.colours[0]
-
 
 class TurquinLobe(WeightedLobe):
     """A lobe times a factor that adds unpolarized light."""
@@ -167,6 +163,5 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     walks = Walks(smith, model.captured[0], uniform)
     if way == "turquin":
         return (turquin(lobe, walks),)
-    # Where F = 1, both colours are ρ, and the series takes less time.
-    walked = way == "walk" and not isinstance(lobe.fresnel, Unit)
-    return lobe, (WalkLobe if walked else KullaContyLobe)(lobe, walks, uniform)
+    kind = WalkLobe if way == "walk" else KullaContyLobe
+    return lobe, (MultipleScattering if isinstance(lobe.fresnel, Unit) else kind)(lobe, walks, uniform)

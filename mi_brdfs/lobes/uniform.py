@@ -13,6 +13,7 @@ import mitsuba as mi
 @dataclass
 class Uniform:
     """Numbers that kernels read instead of computing them in each lane, if they are the same everywhere on a surface.
+    Each costs a kernel about a dozen operations, as it is loaded for every lane: what takes fewer is better computed.
     Called with a name and numbers, it returns those that it has ``kept`` of that name, or else the numbers: also while
     derivatives are sought, which those that are kept have not, and where these are ``stale``."""
 

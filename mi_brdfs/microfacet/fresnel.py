@@ -24,6 +24,9 @@ class Unit(Fresnel):
 
     brightness = __call__
 
+    def combination(self) -> tuple[Spectrum, ...]:
+        return 1.0, 0.0
+
 
 class Schlick(Fresnel):
     """F = f0 + (f90 - f0)(1 - cosθ)ᵖ, p = 5 and f90 = 1 (Schlick 1994, doi:10.1111/1467-8659.1330233), less a multiple

@@ -40,7 +40,7 @@ SMOOTH = {
     "walter correlated": {"type": "walter", "alpha": 0.4, "shadowing": "correlated", **BOTH},
     "walter conductor": {"type": "walter", "alpha": 0.3, "eta": 1.2, "k": 2.0, **BOTH},
     # Between nodes of its table, at which derivatives of what is interpolated jump.
-    "walter walk": {"type": "walter", "alpha_u": 0.45, "alpha_v": 0.7, "f0": 0.4, "multiscatter": "walk", **BOTH},
+    "walter walk": {"type": "walter", "alpha_u": 0.41, "alpha_v": 0.67, "f0": 0.4, "multiscatter": "walk", **BOTH},
     "walter turquin": {"type": "walter", "alpha": 0.6, "eta": 1.2, "k": 2.0, "multiscatter": "turquin", **BOTH},
     "walter schlick": {"type": "walter", "alpha": 0.3, "f0": 0.2, **BOTH},
     "walter dielectric": {"type": "walter", "alpha": 0.3, "int_ior": 1.8, "ext_ior": 1.2, **BOTH},
