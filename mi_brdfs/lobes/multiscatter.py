@@ -13,12 +13,12 @@ from ..math import EPSILON, Spectrum, luminance, safe_sqrt
 from ..microfacet.escape import Escape, Walks, table
 from ..microfacet.fresnel import Unit
 from ..microfacet.shadowing import Smith
-from ..microfacet.terms import Fresnel
+from ..microfacet.terms import Fresnel, basis
 from .lobe import Lobe, WeightedLobe
 from .microfacet import MicrofacetLobe
 
 HEMISPHERE = 1 / 21, 1 / 126
-"""The means of (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶ over a hemisphere, times cosθ."""
+"""The means of (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶ over a hemisphere, weighed by cosθ."""
 
 
 class MultipleScattering(Lobe):
@@ -59,9 +59,8 @@ class MultipleScattering(Lobe):
         """Return an estimate of the albedo of the lobe itself, from F at a typical facet: at grazing angles those count
         that lean towards ``wi``."""
         typical = dr.minimum(wi.z + (self.walks.smith.length(wi) - wi.z) * (1 - wi.z), 1)
-        m2 = dr.square(1 - typical)
-        m5 = m2 * m2 * (1 - typical)
-        fresnel = Fresnel.mean(self.bright, m5, typical * (1 - typical) * m5)
+        _, schlick, dip = basis(typical)
+        fresnel = Fresnel.mean(self.bright, schlick, dip)
         # It may vanish at one angle.
         least = 0.25 * Fresnel.mean(self.bright, *HEMISPHERE)
         return self.reflectance * ((1 - self.walks.of(wi).lost) * dr.maximum(fresnel, least))

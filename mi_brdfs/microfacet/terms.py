@@ -153,8 +153,10 @@ class Fresnel(Term):
         for node, weight in gauss_legendre(4):
             steep, grazing = critical + (1 - critical) * node, critical * node
             for cos, f in (steep, (1 - critical) * self(mi.Float(steep))), (grazing, critical):
-                basis = _basis(cos)
-                weights = (cos * weight * sum(c * it for c, it in zip(row, basis, strict=True)) for row in _inverse())
+                functions = basis(cos)
+                weights = (
+                    cos * weight * sum(c * it for c, it in zip(row, functions, strict=True)) for row in _inverse()
+                )
                 coefficients = [it + f * w for it, w in zip(coefficients, weights, strict=True)]
         normal, rise, raised = coefficients
         return normal, rise, -raised
@@ -183,7 +185,7 @@ class Fresnel(Term):
         return None
 
 
-def _basis(cos: Any) -> tuple[Any, Any, Any]:
+def basis(cos: Any) -> tuple[Any, Any, Any]:
     """Return 1, (1 - cosθ)⁵ and cosθ (1 - cosθ)⁶."""
     m = 1 - cos
     m5 = m * m * m * m * m
@@ -194,8 +196,8 @@ def _basis(cos: Any) -> tuple[Any, Any, Any]:
 def _inverse() -> list[list[float]]:
     """Return the inverse of the products of these over a hemisphere, by which least squares go."""
     cos, weight = np.array(gauss_legendre(4)).T
-    basis = np.stack(np.broadcast_arrays(*_basis(cos)))
-    return np.linalg.inv(basis * (cos * weight) @ basis.T).tolist()
+    functions = np.stack(np.broadcast_arrays(*basis(cos)))
+    return np.linalg.inv(functions * (cos * weight) @ functions.T).tolist()
 
 
 class Directions(Protocol):
