@@ -40,8 +40,8 @@ class MicrofacetLobe(Lobe):
         self.colour, self.reflectance, self.distribution = colour, colour * scale, distribution
         self.shadowing, self.fresnel = shadowing, fresnel
         self.reciprocal, self.anisotropic = shadowing.reciprocal, distribution.anisotropic
-        self.tabulated: Callable[[mi.Vector3f], Spectrum] | None = None
-        """What takes the place of the fitted estimate of its albedo, if there are tables."""
+        self.tabulated: Callable[[mi.Vector3f], mi.Float] | None = None
+        """What takes the place of the fitted estimate of its albedo over ρ, if there are tables."""
 
     def estimated_albedo(self, wi: mi.Vector3f) -> Spectrum:
         """Return an estimate from F, D and G at a typical facet.
@@ -52,7 +52,7 @@ class MicrofacetLobe(Lobe):
         visible.
         """
         if self.tabulated:
-            return self.tabulated(wi)
+            return self.reflectance * self.tabulated(wi)
         cos, versine = dr.maximum(wi.z, 1e-4), 1 - wi.z  # the terms must not vanish
         sin2 = dr.maximum(wi.x * wi.x + wi.y * wi.y, EPSILON)
         slope2 = self.distribution.mean_square_slope_along(wi) / sin2

@@ -41,7 +41,6 @@ class MultipleScattering(Lobe):
         b = self.GRAZING * lost * dr.sqrt(lost)
         self.b, self.norm, self.scale = uniform("lobe", (b, dr.log(1 + dr.rcp(b)), dr.inv_pi / lost))
         self.bright = uniform("brightness", tuple(luminance(it) for it in self.fresnel))
-        self.reflectance, lobe.tabulated = lobe.reflectance, self.lobe_albedo
 
     def between(self, reflectance: Spectrum) -> tuple[Spectrum, ...]:
         """Return what of the colour is the same for all directions: by default all of it, ρ, as for F = 1."""
@@ -55,15 +54,15 @@ class MultipleScattering(Lobe):
         i = self.walks.of(wi)
         return self.colour(i) * i.lost
 
-    def lobe_albedo(self, wi: mi.Vector3f) -> Spectrum:
-        """Return an estimate of the albedo of the lobe itself, from F at a typical facet: at grazing angles those count
-        that lean towards ``wi``."""
+    def lobe_albedo(self, wi: mi.Vector3f) -> mi.Float:
+        """Return an estimate of the albedo of the lobe itself over its ρ, from F at a typical facet: at grazing angles
+        those count that lean towards ``wi``."""
         typical = dr.minimum(wi.z + (self.walks.smith.length(wi) - wi.z) * (1 - wi.z), 1)
         _, schlick, dip = basis(typical)
         fresnel = Fresnel.mean(self.bright, schlick, dip)
         # It may vanish at one angle.
         least = 0.25 * Fresnel.mean(self.bright, *HEMISPHERE)
-        return self.reflectance * ((1 - self.walks.of(wi).lost) * dr.maximum(fresnel, least))
+        return (1 - self.walks.of(wi).lost) * dr.maximum(fresnel, least)
 
     def mirror_reflectance(self, wi: mi.Vector3f) -> Spectrum:
         return 0  # as mirrors, facets lose nothing
@@ -163,4 +162,6 @@ def multiscattering(model: Any, lobe: MicrofacetLobe, index: int) -> tuple[Lobe,
     if way == "turquin":
         return (turquin(lobe, walks),)
     kind = WalkLobe if way == "walk" else KullaContyLobe
-    return lobe, (MultipleScattering if isinstance(lobe.fresnel, Unit) else kind)(lobe, walks, uniform)
+    added = (MultipleScattering if isinstance(lobe.fresnel, Unit) else kind)(lobe, walks, uniform)
+    lobe.tabulated = added.lobe_albedo
+    return lobe, added

@@ -162,7 +162,7 @@ class Fresnel(Term):
         return normal, rise, -raised
 
     @staticmethod
-    def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any, most: Any = 1) -> Spectrum:
+    def mean(combination: Sequence[Spectrum], schlick: Any, dip: Any, most: float = 1) -> Spectrum:
         """Return the mean reflectance, up to ``most``, of facets over which (1 - cosθ)⁵ has the mean ``schlick``, and
         cosθ (1 - cosθ)⁶ the mean ``dip``."""
         normal, rise, *below = combination
