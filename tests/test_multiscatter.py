@@ -227,3 +227,12 @@ def test_materials_that_share_a_texture_follow_it(way):
         for shape in scene.shapes():
             probe = BSDFProbe(shape.bsdf())
             np.testing.assert_allclose(probe.eval(probe.whole, wi, wo), fresh.eval(fresh.whole, wi, wo), 1e-5)
+
+
+@pytest.mark.parametrize("way", ["walk", "kulla-conty"])
+def test_what_is_kept_serves_any_number_of_directions(way):
+    """Dr.Jit widens a zero in place, such as how much F = 1 rises."""
+    probe = BSDFProbe(mi.load_dict(facets(way, (0.7, 0.7))))
+    wi, wo = direction(30, 0)[None], direction(40, 100)[None]
+    values = [probe.eval(probe.whole, wi, np.repeat(wo, count, axis=0)) for count in (7, 3, 5)]
+    np.testing.assert_allclose(np.concatenate(values), np.broadcast_to(values[0][0], (15, 3)), 1e-6)

@@ -29,7 +29,8 @@ class Uniform:
         if self.settling and all(dr.width(number) == 1 for number in numbers):
             self.kept[name] = [dr.detach(number) for number in numbers]
         kept = None if self.settling or self.stale or dr.grad_enabled(numbers) else self.kept.get(name)
-        return numbers if kept is None else kept
+        # As copies: a zero that nobody else holds takes the width of what it is multiplied by.
+        return numbers if kept is None else [dr.detach(number) for number in kept]
 
     def compare(self, textures: Mapping[str, mi.Texture]) -> None:
         """Find out whether textures have other values since numbers were kept: of one that several BSDFs share, Mitsuba
