@@ -589,19 +589,29 @@ def epd(cos, tangent, phi, alpha, gamma):
     return gamma / (np.pi * alpha**2 * special.gamma(1 / gamma)) * lobe
 
 
-def smith_beckmann(v, alpha_u, alpha_v):
-    """Smith's Lambda for Beckmann's distribution (Walter et al. 2007, exact): (e^-a^2 / (a sqrt(pi)) - erfc(a)) / 2."""
+def _upright(v, alpha_u, alpha_v):
+    """a = 1 / (alpha tan(theta)), with the roughness along the direction."""
     theta, phi = _angles(v)
     alpha = np.hypot(alpha_u * np.cos(phi), alpha_v * np.sin(phi))
-    a = 1 / np.maximum(alpha * np.tan(theta), 1e-30)
+    return 1 / np.maximum(alpha * np.tan(theta), 1e-30)
+
+
+def smith_beckmann(v, alpha_u, alpha_v):
+    """Smith's Lambda for Beckmann's distribution (Walter et al. 2007, exact): (e^-a^2 / (a sqrt(pi)) - erfc(a)) / 2."""
+    a = _upright(v, alpha_u, alpha_v)
     return (np.exp(-(a**2)) / (a * np.sqrt(np.pi)) - special.erfc(a)) / 2
 
 
-def smith_blinn(v, exponent):
-    """Smith's Lambda by the rational approximation of Walter et al. 2007, with a = sqrt(n / 2 + 1) / tan(theta)."""
-    theta, _ = _angles(v)
-    a = np.sqrt(exponent / 2 + 1) / np.maximum(np.tan(theta), 1e-30)
+def smith_rational(v, alpha_u, alpha_v):
+    """The rational approximation of that by Walter et al. 2007."""
+    a = _upright(v, alpha_u, alpha_v)
     return np.where(a < 1.6, (1 + 2.276 * a + 2.577 * a**2) / (3.535 * a + 2.181 * a**2) - 1, 0.0)
+
+
+def smith_blinn(v, exponent):
+    """The same, with a = sqrt(n / 2 + 1) / tan(theta)."""
+    alpha = 1 / np.sqrt(exponent / 2 + 1)
+    return smith_rational(v, alpha, alpha)
 
 
 def _smith(i, o, smith_lambda, correlated=False, **parameters):
@@ -622,6 +632,8 @@ def shadowing_term(i, o, shadowing, distribution, parameters, kurt_exponent):
         case "smith" | "smith-correlated":
             smith_lambda = {"beckmann": smith_beckmann, "ggx": smith_ggx, "blinn": smith_blinn}[distribution]
             return _smith(i, o, smith_lambda, correlated=shadowing == "smith-correlated", **parameters)
+        case "smith-rational":
+            return _smith(i, o, smith_rational, **parameters)
         case "vcavity":
             return vcavity(i, o)
         case "schlick":

@@ -28,7 +28,7 @@ from .laws import (
     tan2_of_versine,
     versine_of_tan2,
 )
-from .shadowing import Smith, SmithBeckmann, SmithBlinn, SmithGGX
+from .shadowing import Smith, SmithBeckmann, SmithGGX, SmithRational
 from .terms import ROUGHNESS, Distribution, HalfVectors, Isotropic, widened_roughness
 from .visible import VisibleNormals
 
@@ -131,7 +131,8 @@ class Blinn(Isotropic):
         return Blinn(2 * dr.square(dr.rcp(widened_roughness(self.roughness(), spread))) - 2)
 
     def smith(self, correlated: bool) -> Smith:
-        return SmithBlinn(self.exponent, correlated)
+        alpha = self.roughness()
+        return SmithRational(alpha, alpha, correlated)
 
 
 class AshikhminShirleyNormals(Distribution):

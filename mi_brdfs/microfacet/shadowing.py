@@ -131,15 +131,11 @@ class SmithBeckmann(Smith):
         return v.z + slope * dr.inv_sqrt_pi * dr.square(dr.square(dr.square(root)))
 
 
-class SmithBlinn(Smith):
-    """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution with
+class SmithRational(Smith):
+    """Walter et al.'s rational approximation of Beckmann's Λ, which they use for Blinn's distribution, too, with
     a = √(n/2 + 1) cosθ/sinθ: 1 + Λ = (1 + 2.276 a + 2.577 a²)/(3.535 a + 2.181 a²) for a < 1.6, and 1 otherwise."""
 
     facets = "blinn"
-
-    def __init__(self, exponent: mi.Float, correlated: bool) -> None:
-        alpha = dr.rsqrt(0.5 * exponent + 1)
-        super().__init__(alpha, alpha, correlated)
 
     def stretched(self, v: mi.Vector3f) -> mi.Float:
         slope = dr.sqrt(dr.maximum(self.slope2(v), TINY))
@@ -169,6 +165,20 @@ class CorrelatedSmithOfDistribution(SmithOfDistribution):
 
     word = "smith-correlated"
     correlated = True
+
+
+class RationalSmithOfBeckmann(SmithRational):
+    """The separable one of Beckmann's facets by that approximation, as Mitsuba's ``roughconductor`` has it."""
+
+    word = "smith-rational"
+
+    @classmethod
+    def suits(cls, distribution: type[Distribution]) -> bool:
+        return distribution.word == "beckmann"
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Any], distribution: Any = None) -> Any:
+        return cls(distribution.alpha_u, distribution.alpha_v, False)
 
 
 class SchlickSmith(Shadowing):

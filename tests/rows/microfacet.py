@@ -46,6 +46,7 @@ ROWS = [
         lambda wi, wo: ref.microfacet(wi, wo, 0, 1, "beckmann", "smith", alpha_u=0.1, alpha_v=0.1)),
     row("beckmann", "smith", "anisotropic", {"f0": 0.3}, SCHLICK, turns=0.1, alpha_u=0.1, alpha_v=0.4),
     row("beckmann", "smith-correlated", "rough", alpha=1.0),
+    row("beckmann", "smith-rational", "anisotropic", alpha_u=0.6, alpha_v=0.2),
     row("ggx", "smith-correlated", "anisotropic", turns=0.3, alpha_u=0.1, alpha_v=0.4),
     row("ggx", "schlick", "anisotropic", alpha_u=0.4, alpha_v=0.1),
     row("ggx", "ashikhmin-premoze"),
