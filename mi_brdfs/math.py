@@ -189,4 +189,5 @@ def luminance(colour: Any) -> Any:
     wavelengths in the others (with four wavelengths the CIE weights may all vanish, and a zero here would starve a
     lobe)."""
     colour = mi.UnpolarizedSpectrum(colour)
-    return mi.luminance(colour) if mi.is_rgb else dr.mean(colour)
+    # Not dr.mean, which makes the number of lanes a constant of the kernel.
+    return mi.luminance(colour) if mi.is_rgb else dr.sum(colour) / len(colour)

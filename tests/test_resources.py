@@ -2,9 +2,16 @@
 
 import sys
 
+import drjit as dr
+import mitsuba as mi
 import pytest
 from benchmarks import resources
 from catalogue import SMOOTH, first_of_each, mostly_slow
+
+from mi_brdfs.probe.arrays import launched_kernels
+from mi_brdfs.probe.bsdf import BSDFProbe
+from mi_brdfs.probe.directions import hemisphere
+from mi_brdfs.probe.variates import random
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -18,6 +25,18 @@ def test_neither_updates_nor_loading_again_compile_a_kernel(name):
     words, such as those of a normalization, the same parameters are given the same way."""
     parameters, changed, loaded = resources.fresh_kernels(SMOOTH[name])
     assert parameters and (changed, loaded) == (0, 0)
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("llvm_ad_spectral", marks=pytest.mark.slow)])
+def test_pictures_of_any_size_have_the_same_kernels(variant):
+    """A mean over wavelengths is none over lanes, too."""
+    with mi.variant_context(variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        probe = BSDFProbe(mi.load_dict({"type": "phong", "diffuse_reflectance": 0.3, "specular_reflectance": 0.2}))
+
+        def launched(size):
+            return launched_kernels(lambda: probe.sample(probe.whole, hemisphere(size, 1), random(size, 2)))
+
+        assert launched(100) == launched(1000)
 
 
 @pytest.mark.slow
