@@ -44,16 +44,16 @@ def interaction(wi: ArrayLike, uv: ArrayLike = CENTRE, wavelengths: ArrayLike = 
     si.n = mi.Normal3f(0, 0, 1)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-    si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(_columns(uv))
+    si.uv = mi.Point2f(uv) if np.ndim(uv) == 1 else mi.Point2f(columns_of(uv))
     if mi.is_spectral:
-        columns = list(wavelengths) if isinstance(wavelengths, tuple) else _columns(wavelengths)
+        columns = list(wavelengths) if isinstance(wavelengths, tuple) else columns_of(wavelengths)
         si.wavelengths = mi.UnpolarizedSpectrum(*columns)
     return si
 
 
 def vectors(w: ArrayLike) -> mi.Vector3f:
     """Return directions of shape (3,) or (N, 3) as a vector that Dr.Jit compiles no new kernel for."""
-    result = mi.Vector3f(_columns(w))
+    result = mi.Vector3f(columns_of(w))
     if not is_scalar():
         dr.make_opaque(result)
     return result
@@ -61,7 +61,7 @@ def vectors(w: ArrayLike) -> mi.Vector3f:
 
 def sample_arguments(variates: Array) -> tuple[mi.Float, mi.Point2f]:
     """Return rows of three uniform variates, shape (N, 3), as the two arguments of ``sample``; vectorized only."""
-    return floats(variates[:, 0]), mi.Point2f(_columns(variates[:, 1:]))
+    return floats(variates[:, 0]), mi.Point2f(columns_of(variates[:, 1:]))
 
 
 def hero_wavelengths(count: int) -> Array:
@@ -167,7 +167,7 @@ def launched_kernels(work: Callable[[], object]) -> set[int]:
     return {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
 
 
-def _columns(rows: ArrayLike) -> Any:
+def columns_of(rows: ArrayLike) -> Any:
     """Return rows as the columns that Dr.Jit's arrays are made of, and a single row as it is."""
     columns = np.asarray(rows, np.float32).T
     return columns if columns.ndim == 1 else [floats(column) for column in columns]

@@ -46,7 +46,7 @@ def scattered(count: int, seed: int, sides: Sequence[int]) -> Array:
     phi = 2 * np.pi * ((lane * 0.6180339887498949 + 0.3 * jitter[1]) % 1)
     sin = np.sin(np.radians(theta))
     w = np.stack([sin * np.cos(phi), sin * np.sin(phi), np.cos(np.radians(theta))], axis=-1).astype(np.float32)
-    w[:, 2] *= np.resize(sides, count)
+    w[:, 2] *= np.array(sides)[lane % len(sides)]
     return w
 
 

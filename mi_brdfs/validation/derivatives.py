@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from contextlib import ExitStack
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..parameters import Range, nested
-from ..probe.arrays import Array, interaction, numbers, sample_arguments, vectors
+from ..probe.arrays import Array, all_numbers, interaction, numbers, sample_arguments, vectors
 from ..probe.directions import beside
 from ..probe.variates import random
 from ..ranges import declared, limits_of
@@ -60,9 +61,10 @@ def gradients(run: Run) -> Findings:
     yield directional(run, pairs if len(u) else None)
     parameters, findings = traced_floats(run, "gradients", differentiable=True)
     yield from findings
-    for each in parameters:
+    weights = list(_of_weights(run, parameters, pairs.wi, u)) if len(u) else [None] * len(parameters)
+    for each, of_weights in zip(parameters, weights, strict=True):
         with each.restored():
-            yield _checked(run, each, pairs, u)
+            yield _checked(run, each, pairs, of_weights)
 
 
 def _drawn(run: Run) -> tuple[Pairs, Array]:
@@ -76,13 +78,13 @@ def _drawn(run: Run) -> tuple[Pairs, Array]:
     return Pairs(wi, beside(wi, 14), np.full((COUNT, 1), 2 * np.pi)), u[:0]
 
 
-def _checked(run: Run, parameter: Parameter, pairs: Pairs, u: Array) -> Finding:
+def _checked(run: Run, parameter: Parameter, pairs: Pairs, of_weights: OfWeights | None) -> Finding:
     """Return what is found of the derivatives for a parameter, which is left at any value."""
     outcome, original = Outcome("gradients", parameter.key), parameter.value
     limits = dict(limits_of(parameter.params)).get(parameter.key)
     derivatives = _finite_derivatives(run, outcome, parameter, pairs)
-    if len(u):
-        _check_weight(run, outcome, parameter, pairs.wi, u, derivatives * pairs.scale)
+    if of_weights:
+        _check_weight(run, outcome, of_weights, derivatives * pairs.scale)
     # Mitsuba itself refuses negative values of a measured spectrum.
     if limits and not parameter.key.endswith(".values"):
         _check_ways_back(run, outcome, parameter, limits, pairs)
@@ -147,9 +149,12 @@ def _direction(parameter: Parameter) -> Array:
 
 
 def _along(parameter: Parameter, by: float = 1) -> Any:
-    """Return that, times a number, as a value of the parameter."""
+    """Return that, times a number, as a value of the parameter, in Dr.Jit's own memory (:func:`.arrays.floats`)."""
     value = parameter.value
-    return type(value)(np.float32(by * _direction(parameter)).reshape(np.shape(np.array(value))))
+    direction = type(value)(np.float32(_direction(parameter)).reshape(np.shape(np.array(value))))
+    along = direction * dr.opaque(mi.Float, by)
+    dr.eval(along)
+    return along
 
 
 def _derivatives(run: Run, parameter: Parameter, pairs: Pairs) -> Array:
@@ -177,7 +182,7 @@ def _attached(run: Run, parameter: Parameter, pairs: Pairs) -> tuple[Any, Any]:
 
 
 def _forward(attached: Any, direction: Any) -> None:
-    """Differentiate all that was computed of an attached parameter, which grows along a direction."""
+    """Differentiate all that was computed of attached parameters, which grow along a direction."""
     dr.set_grad(attached, direction)
     dr.enqueue(dr.ADMode.Forward, attached)
     dr.traverse(dr.ADMode.Forward)
@@ -241,20 +246,44 @@ def _turns(parameter: Parameter) -> bool:
 # --- What samplers and optimisers need ------------------------------------------------------------------------------
 
 
-def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u: Array, expected: Array) -> None:
+class OfWeights(NamedTuple):
+    """What there is of derivatives beside those of ``eval``."""
+
+    moved: Array
+    """Those of twice the directions drawn,"""
+    sampled: Array
+    """of ``sample``'s weight,"""
+    again: Array
+    """of that of ``eval_pdf_sample``,"""
+    densities: Array
+    """and of ``eval_pdf``'s value over pdf,"""
+    pair: Array
+    """where pdf counts as constant."""
+
+
+def _of_weights(run: Run, parameters: list[Parameter], wi: Array, u: Array) -> Iterator[OfWeights]:
+    """Yield those for each parameter. Derivatives are taken for all of them, of which one grows, so that a single
+    kernel serves each."""
+    bsdf, whole, si = run.probe.bsdf, run.probe.whole, interaction(wi)
+    for growing in parameters:
+        with ExitStack() as stack:
+            for each in parameters:
+                stack.enter_context(each.restored())
+            attached = [each.attach() for each in parameters]
+            bs, weight = bsdf.sample(whole.context, si, *sample_arguments(u), True)
+            value, density = bsdf.eval_pdf(whole.context, si, dr.detach(bs.wo), True)
+            *_, again = bsdf.eval_pdf_sample(whole.context, si, dr.detach(bs.wo), *sample_arguments(u), True)
+            # Only ends of the graph keep a derivative, and the weight may depend on the direction.
+            results = bs.wo * 2, weight, again, value / density, value / dr.detach(density)
+            if dr.grad_enabled(results):
+                _forward(attached, [_along(each, float(each is growing)) for each in parameters])
+            yield OfWeights(*all_numbers(map(dr.grad, results), len(wi)))
+
+
+def _check_weight(run: Run, outcome: Outcome, of_weights: OfWeights, expected: Array) -> None:
     """Check the derivatives of ``eval_pdf``'s value and of the weights of ``sample`` and ``eval_pdf_sample``, where
     that of ``eval`` over pdf is ``expected``."""
-    bsdf, whole, si = run.probe.bsdf, run.probe.whole, interaction(wi)
-    attached = parameter.attach()
-    bs, weight = bsdf.sample(whole.context, si, *sample_arguments(u), True)
-    value, density = bsdf.eval_pdf(whole.context, si, dr.detach(bs.wo), True)
-    *_, again = bsdf.eval_pdf_sample(whole.context, si, dr.detach(bs.wo), *sample_arguments(u), True)
-    # Only ends of the graph keep a derivative, and the weight may depend on the direction.
-    results = bs.wo * 2, weight, again, value / density, value / dr.detach(density)
-    if dr.grad_enabled(results):
-        _forward(attached, _along(parameter))
-    moved, *of_weights, of_densities, of_pair = (numbers(dr.grad(it), len(wi)) for it in results)
-    weights = dict(zip(("sample's weight", "eval_pdf_sample's weight"), of_weights, strict=True))
+    weights = {"sample's weight": of_weights.sampled, "eval_pdf_sample's weight": of_weights.again}
     for name, values in weights.items():
         if not np.isfinite(values).all():
             lost = 1 - np.isfinite(values).mean()
@@ -263,9 +292,9 @@ def _check_weight(run: Run, outcome: Outcome, parameter: Parameter, wi: Array, u
     if not size > DARK:
         return
     # Plugins other than ours may differentiate their density, too.
-    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_densities)]
-    compared = [("eval_pdf's value over pdf", of_pair, [expected])]
-    if not moved.any():
+    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_weights.densities)]
+    compared = [("eval_pdf's value over pdf", of_weights.pair, [expected])]
+    if not of_weights.moved.any():
         compared += [(name, values, accepted) for name, values in weights.items()]
     for name, values, right in compared:
         error = min(abs(np.nan_to_num(values) - each).mean() for each in right)
@@ -296,7 +325,7 @@ def _check_way_back(run: Run, outcome: Outcome, parameter: Parameter, limit: flo
         for sign in signs:
             if dr.grad_enabled(result):
                 dr.set_grad(attached, 0)
-                dr.set_grad(result, sign)
+                dr.set_grad(result, dr.opaque(mi.Float, sign))
                 dr.enqueue(dr.ADMode.Backward, result)
                 dr.traverse(dr.ADMode.Backward, flags=dr.ADFlag.ClearInterior | dr.ADFlag.ClearInput)
             found.append(gradient(attached))

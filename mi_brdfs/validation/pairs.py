@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..probe.arrays import Array
+from ..probe.arrays import Array, columns_of
 from ..probe.bsdf import Part
 from ..probe.directions import direction, on_side
 from .differences import Differences
@@ -52,8 +52,7 @@ def edges_of(part: Part) -> Pairs:
 
 def differentiate_sum(values: Any, pairs: Pairs) -> None:
     """Differentiate the weighted sum of values, without the sum itself, which would be a kernel of its own."""
-    weights = mi.UnpolarizedSpectrum(np.float32(pairs.weights.T))
-    dr.backward(mi.unpolarized_spectrum(values) * weights)
+    dr.backward(mi.unpolarized_spectrum(values) * mi.UnpolarizedSpectrum(columns_of(pairs.weights)))
 
 
 def light_of(run: Run, pairs: Pairs) -> float:

@@ -168,7 +168,7 @@ def _trials(
                 yield Samples(*fields)
 
     def density(of: Array | int, wo: Array) -> Array:
-        return np.nan_to_num(probe.pdf(part, wis[of], wo, uvs[of]))
+        return np.nan_to_num(probe.pdf(part, np.take(wis, of, axis=0), wo, np.take(uvs, of, axis=0)))
 
     pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
     # The quadrature is as precise as for the larger count, for the sake of the sum.
@@ -183,7 +183,7 @@ def _trials(
         counted = min(samples.drawn, samples.lit, key=lambda these: abs(these.mean() - integral))
         # No cell holds the density of what a rounding error lifts out of the horizon.
         counted &= abs(samples.wo[:, 2]) > HORIZON
-        counts, weights = _sums(partition, Samples(*(field[counted] for field in samples)))
+        counts, weights = _sums(partition, samples, counted)
         trial = Trial(part.name, incident, partition, counts, weights, count, 1 + 2 * (k - k % at_once))
         if turn:
             if len(doubtful := trial.doubtful):
@@ -195,10 +195,10 @@ def _trials(
     return found
 
 
-def _sums(partition: Partition, samples: Samples) -> tuple[Array, Array]:
-    """Return :attr:`Trial.counts` and :attr:`Trial.weights` of some samples."""
-    own, count = partition.cells(samples.wo), len(partition.starts)
-    with np.errstate(divide="ignore"):
-        both = luminance(samples.weight), luminance(samples.value / samples.pdf[:, None])
-    sums = [np.bincount(own, np.nan_to_num(each, posinf=LARGEST), count) for each in both]
+def _sums(partition: Partition, samples: Samples, counted: Array) -> tuple[Array, Array]:
+    """Return :attr:`Trial.counts` and :attr:`Trial.weights` of those samples that are counted."""
+    own, count = partition.cells(samples.wo[counted]), len(partition.starts)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = luminance(samples.weight), luminance(samples.value) / samples.pdf
+    sums = [np.bincount(own, np.nan_to_num(each[counted], posinf=LARGEST), count) for each in both]
     return np.bincount(own, minlength=count), np.array(sums)
