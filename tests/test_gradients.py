@@ -8,6 +8,8 @@ import reference
 from catalogue import FIRST_ROWS, ROWS, SMOOTH, mostly_slow
 from support import direction, hemisphere, interaction, sample_arguments, unit
 
+from mi_brdfs.probe.arrays import columns_of
+
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
 FEW = "eon", "ward"
@@ -60,13 +62,19 @@ def differences(params, key, entries, step, loss):
         for shift in (step, -step):
             moved = original.copy()
             moved.ravel()[entry] += shift
-            params[key] = type(params[key])(moved)
-            params.update()
+            update(params, key, moved)
             losses.append(loss())
         found.append((losses[0] - losses[1]) / (2 * step))
-    params[key] = type(params[key])(original)
-    params.update()
+    update(params, key, original)
     return found
+
+
+def update(params, key, array):
+    """Set a parameter to the values of a NumPy array, in Dr.Jit's own memory: kernels depend on how that is aligned."""
+    value = type(params[key])(array) + dr.opaque(mi.Float, 0)
+    dr.eval(value)
+    params[key] = value
+    params.update()
 
 
 @pytest.mark.parametrize("name", mostly_slow(SMOOTH, FEW))
@@ -82,9 +90,11 @@ def test_weights_have_the_derivatives_of_values(name):
     counts = rng.random((3, SAMPLES))
     bs, _ = bsdf.sample(ctx, si, *variates, True)
     pdf, wo = np.array(bs.pdf), mi.Vector3f(bs.wo)
+    for key in params.keys():  # for all of them to have the same kernels
+        update(params, key, np.array(params[key]))
 
     def weights():
-        return dr.sum(dr.dot(bsdf.sample(ctx, si, *variates, True)[1], mi.Color3f(counts)))
+        return dr.dot(bsdf.sample(ctx, si, *variates, True)[1], mi.Color3f(columns_of(counts.T)))
 
     def values():
         value = np.float64(bsdf.eval(ctx, si, wo, True)) * counts
