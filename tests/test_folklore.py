@@ -73,7 +73,7 @@ def test_options_exist():
     head, rule, *rows = ROWS
     assert {len(row) for row in ROWS} == {len(head)} == {5} and set("".join(rule)) == {"-"}
     assert len(rows) > 40 and all(cell for row in rows for cell in row[:4])
-    options = [(row[0].strip("`"), re.findall(r"`(\w+)=(\w+)`", row[4])) for row in rows]
+    options = [(row[0].strip("`"), re.findall(r"`(\w+)=([\w-]+)`", row[4])) for row in rows]
     assert sum(len(given) for _, given in options) > 12
     for model, given in options:
         assert model == "any" or model in mi_brdfs.list_models()
@@ -239,6 +239,15 @@ def test_microfacets_over_pi():
     bright = albedo(lambda wi, wo: ggx(wi, wo) / np.pi)
     assert bright / published == pytest.approx(4 / np.pi)
     assert_printed("walter", f"the albedo at 0° is {bright:.2f} instead of {published:.2f} (α = 0.1)")
+
+
+def test_an_approximated_shadowing_term():
+    def of(shadowing):
+        facets = {"distribution": "beckmann", "shadowing": shadowing, "alpha_u": 0.3, "alpha_v": 0.3}
+        return albedo(partial(ref.microfacet, **SPECULAR, **facets), 80)
+
+    told = f"for α = 0.3 the albedo at 80° is {of('smith-rational'):.3f} instead of {of('smith'):.3f}"
+    assert_printed("microfacet", told)
 
 
 def test_distributions_that_are_none():
