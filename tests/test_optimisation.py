@@ -13,6 +13,7 @@ from support import hemisphere, interaction, numbers
 import mi_brdfs
 from mi_brdfs.microfacet.fresnel import Conductor
 from mi_brdfs.mitsuba.registry import own_models
+from mi_brdfs.probe.arrays import floats
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
 
@@ -66,18 +67,21 @@ class Problem:
 
     def set(self, values):
         for name, drawn in values.items():
-            self.params[self.keys[name]] = mi.TensorXf(
-                np.broadcast_to(np.float32(drawn), STARTS).reshape(SIDE, SIDE, 1).copy()
-            )
+            self.params[self.keys[name]] = mi.TensorXf(floats(np.broadcast_to(drawn, STARTS)), (SIDE, SIDE, 1))
         self.params.update()
 
     def values(self):
         return mi.luminance(self.bsdf.eval(mi.BSDFContext(), self.si, self.wo, True))
 
+    def squares(self, values):
+        """What the loss of each start is a sum of."""
+        return dr.square(dr.asinh(values / UNIT) - dr.asinh(self.target / UNIT))
+
     def losses(self):
         """The loss of each start."""
-        difference = dr.asinh(self.values() / UNIT) - dr.asinh(self.target / UNIT)
-        return dr.block_sum(dr.square(difference), PAIRS)
+        values = self.values()
+        dr.eval(values)  # by the kernel of the target
+        return np.array(self.squares(values)).reshape(STARTS, PAIRS).sum(axis=1)
 
     def attached(self, keys, settings):
         """The values of some settings, with derivatives for all of ``keys``, so that these share a kernel."""
@@ -90,7 +94,7 @@ class Problem:
     def backward(self, keys, key, settings, sign):
         """The derivative of ``sign`` times the sum of a start's values with respect to its parameter."""
         values = self.attached(keys, settings)
-        dr.backward(dr.opaque(mi.Float, sign) * dr.sum(mi.luminance(values)))
+        dr.backward(dr.opaque(mi.Float, sign) * mi.luminance(values))
         return np.array(dr.grad(self.params[key]).array)
 
     def forward(self, keys, key, settings):
@@ -107,7 +111,7 @@ class Problem:
     def optimise(self, steps):
         """The losses in the beginning and at the end, and where the parameters end, by name."""
         self.set(self.starts)
-        before = np.array(self.losses())
+        before = self.losses()
         optimizer = mi.ad.Adam(lr=1)
         for key in self.keys.values():
             optimizer[key] = self.params[key]
@@ -116,11 +120,11 @@ class Problem:
             decay = 0.4 * 0.5 ** (6 * step / steps)
             rates = {self.keys[n]: decay * min(high - low, 50) for n, (low, high) in self.limits().items()}
             optimizer.set_learning_rate(rates)
-            dr.backward(dr.sum(self.losses()))
+            dr.backward(self.squares(self.values()))  # of which the sum would be a kernel of its own
             optimizer.step()
             self.params.update(optimizer)
             mi_brdfs.project(self.params, optimizer)
-        return before, np.array(self.losses()), {n: np.array(self.params[k]).ravel() for n, k in self.keys.items()}
+        return before, self.losses(), {n: np.array(self.params[k]).ravel() for n, k in self.keys.items()}
 
 
 FEW = "eon", "ward"

@@ -41,6 +41,7 @@ def context(mode):
 
 def elements(matrix, count):
     """Those of a Mueller matrix, shape (count, channels, 4, 4)."""
+    dr.eval(matrix)  # in one kernel
     rows = [[numbers(mi.UnpolarizedSpectrum(matrix[i, j]), count) for j in range(4)] for i in range(4)]
     return np.moveaxis(np.array(rows, np.float64), (0, 1), (-2, -1))
 

@@ -182,11 +182,12 @@ def _to_sphere(px: Array, py: Array, axis: Array) -> tuple[Array, Array]:
     """Return the directions, in float32, of points of the unit square, and the solid angle of its unit area there."""
     latitude, longitude = np.pi * (px - 0.5), 2 * np.pi * py
     cos, across, right, up = np.cos(latitude), np.sin(latitude), np.cos(longitude), np.sin(longitude)
-    w = np.empty((*np.broadcast_shapes(px.shape, py.shape), 3), np.float32)
-    w[..., 0] = axis[0] * cos * right - axis[1] * across
-    w[..., 1] = axis[1] * cos * right + axis[0] * across
-    w[..., 2] = cos * up
-    return w, 2 * np.pi**2 * cos
+    # Coordinate by coordinate, as Dr.Jit's arrays are.
+    w = np.empty((3, *np.broadcast_shapes(px.shape, py.shape)), np.float32)
+    w[0] = axis[0] * cos * right - axis[1] * across
+    w[1] = axis[1] * cos * right + axis[0] * across
+    w[2] = cos * up
+    return np.moveaxis(w, 0, -1), 2 * np.pi**2 * cos
 
 
 def _places(w: Array, axis: Array) -> Array:

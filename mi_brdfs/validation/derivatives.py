@@ -247,18 +247,18 @@ def _turns(parameter: Parameter) -> bool:
 
 
 class OfWeights(NamedTuple):
-    """What there is of derivatives beside those of ``eval``."""
+    """The derivatives of what ``eval`` is not."""
 
     moved: Array
     """Those of twice the directions drawn,"""
     sampled: Array
-    """of ``sample``'s weight,"""
+    """of the weight of ``sample``,"""
     again: Array
     """of that of ``eval_pdf_sample``,"""
-    densities: Array
-    """and of ``eval_pdf``'s value over pdf,"""
+    quotient: Array
+    """of ``eval_pdf``'s value over pdf, where both are differentiated,"""
     pair: Array
-    """where pdf counts as constant."""
+    """and where the value alone is."""
 
 
 def _of_weights(run: Run, parameters: list[Parameter], wi: Array, u: Array) -> Iterator[OfWeights]:
@@ -292,7 +292,7 @@ def _check_weight(run: Run, outcome: Outcome, of_weights: OfWeights, expected: A
     if not size > DARK:
         return
     # Plugins other than ours may differentiate their density, too.
-    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_weights.densities)]
+    accepted = [expected] if run.probe.is_ours else [expected, np.nan_to_num(of_weights.quotient)]
     compared = [("eval_pdf's value over pdf", of_weights.pair, [expected])]
     if not of_weights.moved.any():
         compared += [(name, values, accepted) for name, values in weights.items()]

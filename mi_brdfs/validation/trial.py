@@ -168,7 +168,8 @@ def _trials(
                 yield Samples(*fields)
 
     def density(of: Array | int, wo: Array) -> Array:
-        return np.nan_to_num(probe.pdf(part, np.take(wis, of, axis=0), wo, np.take(uvs, of, axis=0)))
+        wi, uv = (np.take(each.T, of, axis=1).T for each in (wis, uvs))
+        return np.nan_to_num(probe.pdf(part, wi, wo, uv))
 
     pilots = [samples.wo[samples.drawn] for samples in drawn(int(count * pilot), 0)]
     # The quadrature is as precise as for the larger count, for the sake of the sum.
