@@ -83,7 +83,7 @@ def _checked(run: Run, parameter: Parameter, pairs: Pairs, of_weights: OfWeights
     outcome, original = Outcome("gradients", parameter.key), parameter.value
     limits = dict(limits_of(parameter.params)).get(parameter.key)
     derivatives = _finite_derivatives(run, outcome, parameter, pairs)
-    if of_weights:
+    if of_weights is not None:
         _check_weight(run, outcome, of_weights, derivatives * pairs.scale)
     # Mitsuba itself refuses negative values of a measured spectrum.
     if limits and not parameter.key.endswith(".values"):
@@ -265,10 +265,11 @@ def _of_weights(run: Run, parameters: list[Parameter], wi: Array, u: Array) -> I
     """Yield those for each parameter. Derivatives are taken for all of them, of which one grows, so that a single
     kernel serves each."""
     bsdf, whole, si = run.probe.bsdf, run.probe.whole, interaction(wi)
-    for growing in parameters:
-        with ExitStack() as stack:
-            for each in parameters:
-                stack.enter_context(each.restored())
+    with ExitStack() as stack:
+        for each in parameters:
+            stack.enter_context(each.restored())
+        still = [_along(each, 0) for each in parameters]
+        for k, growing in enumerate(parameters):
             attached = [each.attach() for each in parameters]
             bs, weight = bsdf.sample(whole.context, si, *sample_arguments(u), True)
             value, density = bsdf.eval_pdf(whole.context, si, dr.detach(bs.wo), True)
@@ -276,7 +277,7 @@ def _of_weights(run: Run, parameters: list[Parameter], wi: Array, u: Array) -> I
             # Only ends of the graph keep a derivative, and the weight may depend on the direction.
             results = bs.wo * 2, weight, again, value / density, value / dr.detach(density)
             if dr.grad_enabled(results):
-                _forward(attached, [_along(each, float(each is growing)) for each in parameters])
+                _forward(attached, [*still[:k], _along(growing), *still[k + 1 :]])
             yield OfWeights(*all_numbers(map(dr.grad, results), len(wi)))
 
 
