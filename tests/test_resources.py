@@ -28,7 +28,7 @@ def test_neither_updates_nor_loading_again_compile_a_kernel(name):
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", pytest.param("llvm_ad_spectral", marks=pytest.mark.slow)])
-def test_pictures_of_any_size_have_the_same_kernels(variant):
+def test_any_number_of_directions_has_the_same_kernels(variant):
     """A mean over wavelengths is none over lanes, too."""
     with mi.variant_context(variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         probe = BSDFProbe(mi.load_dict({"type": "phong", "diffuse_reflectance": 0.3, "specular_reflectance": 0.2}))
