@@ -104,7 +104,8 @@ class Trial:
         own, centres = [self.counts, self.expected], self.partition.centres
         middles = centres[:: max(len(centres) // 1000, 1)]
         cosines, each = middles @ centres.T, np.stack(own, axis=1).astype(np.float32)
-        caps = [(cosines > np.cos(radius)).astype(np.float32) @ each for radius in np.radians(CAPS)]
+        within = np.empty_like(cosines)
+        caps = [np.greater(cosines, np.float32(np.cos(radius)), out=within) @ each for radius in np.radians(CAPS)]
         counts, expected = (np.concatenate([each, *(cap[:, k] for cap in caps)]) for k, each in enumerate(own))
         return counts, expected
 
