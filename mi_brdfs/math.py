@@ -191,3 +191,11 @@ def luminance(colour: Any) -> Any:
     colour = mi.UnpolarizedSpectrum(colour)
     # Not dr.mean, which makes the number of lanes a constant of the kernel.
     return mi.luminance(colour) if mi.is_rgb else dr.sum(colour) / len(colour)
+
+
+def aligned(array: Any) -> Any:
+    """Return an array that uses NumPy's memory in Dr.Jit's own, which is aligned: for what is not, by chance, it has
+    other kernels, and looks up channels one by one."""
+    own = array * dr.opaque(mi.Float, 1)
+    dr.eval(own)
+    return own

@@ -8,6 +8,7 @@ import reference
 from catalogue import FIRST_ROWS, ROWS, SMOOTH, mostly_slow
 from support import direction, hemisphere, interaction, sample_arguments, unit
 
+from mi_brdfs.math import aligned
 from mi_brdfs.probe.arrays import columns_of
 
 pytestmark = pytest.mark.usefixtures("llvm_rgb")
@@ -70,10 +71,8 @@ def differences(params, key, entries, step, loss):
 
 
 def update(params, key, array):
-    """Set a parameter to the values of a NumPy array, in Dr.Jit's own memory: kernels depend on how that is aligned."""
-    value = type(params[key])(array) + dr.opaque(mi.Float, 0)
-    dr.eval(value)
-    params[key] = value
+    """Set a parameter to the values of a NumPy array."""
+    params[key] = aligned(type(params[key])(array))
     params.update()
 
 

@@ -70,24 +70,27 @@ CONDUCTORS = {
     "semiconductor": {"eta": 3.0, "k": 0.01, "alpha": 0.6},
 }
 GGX = {"type": "walter"}, {"type": "roughconductor", "distribution": "ggx"}
-BECKMANN = (
-    {"type": "microfacet", "shadowing": "smith-rational"},
-    {"type": "roughconductor", "distribution": "beckmann"},
-)
+EXACT = {"type": "microfacet"}, {"type": "roughconductor", "distribution": "beckmann"}
+BECKMANN = EXACT[0] | {"shadowing": "smith-rational"}, EXACT[1]
 
 
 @pytest.mark.parametrize("variant", [IN_LLVM, "scalar_spectral_polarized"])
 @pytest.mark.parametrize("mode", MODES, ids=["radiance", "importance"])
 def test_all_elements_are_those_of_roughconductor(mode, variant):
-    """To 1e-4 of the intensity."""
+    """To 1e-4 of the intensity. The exact shadowing of Beckmann's facets differs from the approximated one by up to
+    .7 %: a factor that all elements have."""
     with mi.variant_context(variant):
         wi, wo = directions(16 if is_scalar() else 4000)
         for name, given in CONDUCTORS.items():
-            for ours, theirs in (GGX, BECKMANN):
+            for ours, theirs in (GGX, BECKMANN, EXACT):
                 found, expected = (matrices(bsdf | given, wi, wo, mode) for bsdf in (ours, theirs))
                 lit = expected[..., 0, 0] > 1e-12
                 assert lit.mean() > 0.4
                 found, expected = found[lit], expected[lit]
+                if ours is EXACT[0]:
+                    ratio = found[:, 0, 0] / expected[:, 0, 0]
+                    np.testing.assert_allclose(ratio, 1, rtol=7e-3)
+                    found = found / ratio[:, None, None]
                 assert in_parts_of_the_intensity(found, expected).max() < 1e-4
                 if name != "semiconductor":  # which leaves linear light linear
                     assert (abs(expected[:, 1:, 1:]).max(axis=0) > 0.01 * expected[:, 0, 0].max()).all()

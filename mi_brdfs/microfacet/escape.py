@@ -25,6 +25,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..math import aligned
 from .shadowing import Smith
 
 FILE = Path(__file__).with_name("escape.npz")
@@ -137,8 +138,5 @@ def table(smith: Smith) -> Any:
     if smith.alpha_u is smith.alpha_v:
         kind, entries = mi.Texture1f, entries[-1][:, ISOTROPIC]
     values = np.pad(entries, [(0, 0)] * (entries.ndim - 1) + [(0, -entries.shape[-1] % 8)])
-    # Channels are looked up together only from arrays that are aligned, as Dr.Jit's are and NumPy's need not be.
-    tensor = mi.TensorXf(np.float32(values)) * dr.opaque(mi.Float, 1)
-    dr.eval(tensor)
     # Accelerated look-ups of CUDA would interpolate with eight bits.
-    return kind(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp)
+    return kind(aligned(mi.TensorXf(np.float32(values))), use_accel=False, wrap_mode=dr.WrapMode.Clamp)

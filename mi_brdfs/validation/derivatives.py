@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..math import aligned
 from ..parameters import Range, nested
 from ..probe.arrays import Array, all_numbers, interaction, numbers, sample_arguments, vectors
 from ..probe.directions import beside
@@ -149,12 +150,9 @@ def _direction(parameter: Parameter) -> Array:
 
 
 def _along(parameter: Parameter, by: float = 1) -> Any:
-    """Return that, times a number, as a value of the parameter, in Dr.Jit's own memory (:func:`.arrays.floats`)."""
+    """Return that, times a number, as a value of the parameter."""
     value = parameter.value
-    direction = type(value)(np.float32(_direction(parameter)).reshape(np.shape(np.array(value))))
-    along = direction * dr.opaque(mi.Float, by)
-    dr.eval(along)
-    return along
+    return aligned(type(value)(np.float32(by * _direction(parameter)).reshape(np.shape(np.array(value)))))
 
 
 def _derivatives(run: Run, parameter: Parameter, pairs: Pairs) -> Array:
